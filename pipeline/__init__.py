@@ -1,0 +1,1 @@
+"""Selfmotion: optimal redundancy resolution for robot arms."""

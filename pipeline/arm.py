@@ -1,0 +1,268 @@
+"""The arm: kinematics, dynamics and their derivatives from Drake's MultibodyPlant, for many configurations per call.
+
+All methods take stacked arguments, one row per knot: q, qd, qdd are (K, n). Up to `BLOCK` copies of the arm live in one
+plant, so that one call into Drake serves that many knots. There is no gravity (a space arm), unless stated.
+Sources: PMKE paper Section 2.1, Global paper Section 2; derivatives: see each method.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+from pydrake.math import RigidTransform
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import FixedOffsetFrame, JacobianWrtVariable, MultibodyForces
+
+from pipeline.arrays import Array
+from pipeline.urdf import Description
+
+BLOCK = 16  # copies per plant: beyond this Drake's cost per knot no longer falls
+_STEP = 1e-5  # central differences of smooth rigid-body functions: truncation and rounding balance near 1e-10
+
+
+class _Stack:
+    """`size` copies of one arm in one plant, with a context of its own."""
+
+    def __init__(self, description: Description, size: int, offset: Array) -> None:
+        plant = MultibodyPlant(0.0)
+        plant.mutable_gravity_field().set_gravity_vector(np.zeros(3))
+        parser = Parser(plant)
+        parser.SetAutoRenaming(True)
+        self.tips, self.links = [], []
+        order: list[int] = []
+        for _ in range(size):
+            (model,) = parser.AddModelsFromString(description.xml, "urdf")
+            base = plant.GetFrameByName(description.base, model)
+            if description.base != "world":
+                plant.WeldFrames(plant.world_frame(), base)
+            tip = plant.GetFrameByName(description.end_effector, model)
+            if np.any(offset):
+                tip = plant.AddFrame(FixedOffsetFrame("end_effector_point", tip, RigidTransform(offset), model))
+            self.tips.append(tip)
+            self.links.append([plant.GetJointByName(name, model).frame_on_child() for name in description.joints])
+        plant.Finalize()
+        for model_links in self.links:
+            order += [self._joint_position(plant, frame) for frame in model_links]
+        # The copies are chains, so Drake numbers their positions as we stack them; everything below relies on it.
+        assert order == list(range(size * len(description.joints))), order
+        self.size, self.n = size, len(description.joints)
+        self.plant, self.context = plant, plant.CreateDefaultContext()
+        self.no_forces = MultibodyForces(plant)
+        self.world = plant.world_frame()
+        self.zero = np.zeros(size * self.n)
+
+    @staticmethod
+    def _joint_position(plant: MultibodyPlant, child: Any) -> int:
+        for index in plant.GetJointIndices(child.model_instance()):
+            joint = plant.get_joint(index)
+            if joint.num_positions() and joint.frame_on_child().index() == child.index():
+                return int(joint.position_start())
+        raise AssertionError("every moving joint has a position")
+
+    def at(self, q: Array, qd: Array | None = None) -> None:
+        self.plant.SetPositions(self.context, q.ravel())
+        self.plant.SetVelocities(self.context, self.zero if qd is None else qd.ravel())
+
+    def inverse_dynamics(self, qdd: Array) -> Array:
+        tau: Array = self.plant.CalcInverseDynamics(self.context, qdd.ravel(), self.no_forces)
+        return tau.reshape(self.size, self.n)
+
+    def bias(self) -> Array:
+        b: Array = self.plant.CalcBiasTerm(self.context)
+        return b.reshape(self.size, self.n)
+
+
+class Arm:
+    """A serial arm with n joints, welded to the world, and its end-effector point.
+
+    `description` comes from `pipeline.urdf.read`; `offset` (3,) [m] moves the end-effector point within its link.
+    """
+
+    def __init__(self, description: Description, offset: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> None:
+        self.description = description
+        self.offset = np.asarray(offset, dtype=float)
+        self.n = len(description.joints)
+        self._stacks: dict[int, _Stack] = {}
+
+    # --- kinematics ---------------------------------------------------------------------------------------------
+
+    def position(self, q: Array) -> Array:
+        """End-effector positions (K, 3) [m] in the world."""
+
+        def one(stack: _Stack, q: Array) -> Array:
+            stack.at(q)
+            return np.array([tip.CalcPoseInWorld(stack.context).translation() for tip in stack.tips])
+
+        return self._map(one, q)
+
+    def jacobian(self, q: Array) -> Array:
+        """Translational Jacobians (K, 3, n) of the end effector [m/rad]."""
+
+        def one(stack: _Stack, q: Array) -> Array:
+            stack.at(q)
+            return self._jacobians(stack)
+
+        return self._map(one, q)
+
+    def position_and_jacobian(self, q: Array) -> tuple[Array, Array]:
+        """Both of the above from one pass: (K, 3), (K, 3, n)."""
+        joint = self._map(self._position_and_jacobian, q)
+        return joint[:, :, 0], joint[:, :, 1:]
+
+    def jacobian_rate_term(self, q: Array, qd: Array) -> Array:
+        """The acceleration Jd qd (K, 3) [m/s^2] of the end effector at qdd = 0."""
+
+        def one(stack: _Stack, q: Array, qd: Array) -> Array:
+            stack.at(q, qd)
+            bias = stack.plant.CalcBiasTranslationalAcceleration
+            rows = [
+                bias(stack.context, JacobianWrtVariable.kV, tip, np.zeros(3), stack.world, stack.world)
+                for tip in stack.tips
+            ]
+            return np.array(rows).reshape(stack.size, 3)
+
+        return self._map(one, q, qd)
+
+    def joint_positions(self, q: Array) -> Array:
+        """Origins of the n joints and of the end effector (K, n + 1, 3) [m]: the stick figure."""
+
+        def one(stack: _Stack, q: Array) -> Array:
+            stack.at(q)
+            return np.array(
+                [
+                    [frame.CalcPoseInWorld(stack.context).translation() for frame in (*links, tip)]
+                    for links, tip in zip(stack.links, stack.tips, strict=True)
+                ]
+            )
+
+        return self._map(one, q)
+
+    # --- dynamics -----------------------------------------------------------------------------------------------
+
+    def mass_matrix(self, q: Array) -> Array:
+        """M(q) (K, n, n) [kg m^2]."""
+
+        def one(stack: _Stack, q: Array) -> Array:
+            stack.at(q)
+            return _diagonal_blocks(stack.plant.CalcMassMatrix(stack.context), stack.size)
+
+        return self._map(one, q)
+
+    def bias(self, q: Array, qd: Array) -> Array:
+        """Coriolis and centrifugal torques n(q, qd) (K, n) [N m], quadratic in qd."""
+
+        def one(stack: _Stack, q: Array, qd: Array) -> Array:
+            stack.at(q, qd)
+            return stack.bias()
+
+        return self._map(one, q, qd)
+
+    def inverse_dynamics(self, q: Array, qd: Array, qdd: Array) -> Array:
+        """Joint torques tau = M(q) qdd + n(q, qd) (K, n) [N m]."""
+
+        def one(stack: _Stack, q: Array, qd: Array, qdd: Array) -> Array:
+            stack.at(q, qd)
+            return stack.inverse_dynamics(qdd)
+
+        return self._map(one, q, qd, qdd)
+
+    def kinetic_energy(self, q: Array, qd: Array) -> Array:
+        """T = 1/2 qd' M(q) qd (K,) [J]."""
+        return 0.5 * np.einsum("kn,kn->k", qd, self.inverse_dynamics(q, np.zeros_like(qd), qd))
+
+    # --- derivatives --------------------------------------------------------------------------------------------
+
+    def kinetic_energy_gradient(self, q: Array, qd: Array) -> tuple[Array, Array, Array]:
+        """T (K,), dT/dq (K, n) [J/rad] and dT/dqd = M qd (K, n) [N m s].
+
+        dT/dq = Mdot qd - n(q, qd), with Mdot qd the central difference of M(q) qd along qd: three calls for any n.
+        """
+
+        def one(stack: _Stack, q: Array, qd: Array) -> Array:
+            step = _STEP / np.maximum(np.sqrt((qd * qd).sum(axis=1, keepdims=True)), 1e-3)
+            stack.at(q)
+            momentum = stack.inverse_dynamics(qd)
+            stack.at(q + step * qd)
+            ahead = stack.inverse_dynamics(qd)
+            stack.at(q - step * qd)
+            rate = (ahead - stack.inverse_dynamics(qd)) / (2 * step)
+            stack.at(q, qd)
+            return np.hstack([rate - stack.bias(), momentum])
+
+        both = self._map(one, q, qd)
+        by_q, by_qd = both[:, : self.n], both[:, self.n :]
+        return 0.5 * (qd * by_qd).sum(axis=1), by_q, by_qd
+
+    def inverse_dynamics_gradient(self, q: Array, qd: Array, qdd: Array) -> tuple[Array, Array, Array, Array]:
+        """tau (K, n) and dtau/dq, dtau/dqd, dtau/dqdd = M, each (K, n, n) with [k, i, j] = d tau_i / d x_j.
+
+        By qd exactly, by polarisation of the bias (it is quadratic in qd); by q with central differences.
+        """
+
+        def one(stack: _Stack, q: Array, qd: Array, qdd: Array) -> Array:
+            out = np.empty((stack.size, stack.n, 1 + 3 * stack.n))
+            by_q, by_qd = out[:, :, 1 : 1 + stack.n], out[:, :, 1 + stack.n : 1 + 2 * stack.n]
+            for j, unit in enumerate(np.eye(stack.n)):
+                stack.at(q + _STEP * unit, qd)
+                ahead = stack.inverse_dynamics(qdd)
+                stack.at(q - _STEP * unit, qd)
+                by_q[:, :, j] = (ahead - stack.inverse_dynamics(qdd)) / (2 * _STEP)
+                stack.at(q, qd + unit)
+                ahead = stack.bias()
+                stack.at(q, qd - unit)
+                by_qd[:, :, j] = (ahead - stack.bias()) / 2
+            stack.at(q, qd)
+            out[:, :, 0] = stack.inverse_dynamics(qdd)
+            out[:, :, 1 + 2 * stack.n :] = _diagonal_blocks(stack.plant.CalcMassMatrix(stack.context), stack.size)
+            return out
+
+        out = self._map(one, q, qd, qdd)
+        n = self.n
+        return out[:, :, 0], out[:, :, 1 : 1 + n], out[:, :, 1 + n : 1 + 2 * n], out[:, :, 1 + 2 * n :]
+
+    # --- stacking -----------------------------------------------------------------------------------------------
+
+    def _map(self, one: Callable[..., Array], *arguments: Array) -> Array:
+        blocks = list(self._blocks(one, *arguments))
+        return blocks[0] if len(blocks) == 1 else np.concatenate(blocks)
+
+    def _blocks(self, one: Callable[..., Array], *arguments: Array) -> Iterator[Array]:
+        count = len(arguments[0])
+        for start in range(0, count, BLOCK):
+            size = min(BLOCK, count - start)
+            if size not in self._stacks:
+                self._stacks[size] = _Stack(self.description, size, self.offset)
+            yield one(self._stacks[size], *(argument[start : start + size] for argument in arguments))
+
+    def _position_and_jacobian(self, stack: _Stack, q: Array) -> Array:
+        stack.at(q)
+        out = np.empty((stack.size, 3, 1 + self.n))
+        out[:, :, 0] = [tip.CalcPoseInWorld(stack.context).translation() for tip in stack.tips]
+        out[:, :, 1:] = self._jacobians(stack)
+        return out
+
+    @staticmethod
+    def _jacobians(stack: _Stack) -> Array:
+        n, zero = stack.n, np.zeros(3)
+        jacobian = stack.plant.CalcJacobianTranslationalVelocity
+        return np.array(
+            [
+                jacobian(stack.context, JacobianWrtVariable.kV, tip, zero, stack.world, stack.world)[
+                    :, k * n : (k + 1) * n
+                ]
+                for k, tip in enumerate(stack.tips)
+            ]
+        )
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Plants cannot be pickled: a worker process builds its own (about 3 ms) when it first needs one."""
+        return {**self.__dict__, "_stacks": {}}
+
+
+def _diagonal_blocks(matrix: Array, count: int) -> Array:
+    """The (count, n, n) blocks on the diagonal of a (count n, count n) matrix."""
+    n = len(matrix) // count
+    return np.ascontiguousarray(np.einsum("kikj->kij", matrix.reshape(count, n, count, n)))

@@ -1,0 +1,181 @@
+"""The typed schema of `conf/`: one dataclass per group. The only place where keys and their bounds are known.
+
+Defaults here equal the files under `conf/` (a test compares them), so that the same options serve Python callers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from pipeline.schema import (
+    angle_or_vector,
+    any_number,
+    build,
+    choice,
+    choices,
+    count,
+    mapping,
+    number,
+    numbers,
+    one_of,
+    part,
+    switch,
+    text,
+)
+
+METHODS = ("lsv", "pmke", "global")
+
+
+@dataclass(frozen=True)
+class RobotConfig:
+    """Group `robot`: the description, the end effector, what of it is prescribed, and where the arm starts."""
+
+    name: str = text("planar3r")
+    urdf: str = text("robots/planar3r.urdf")
+    base: str | None = text(None)
+    end_effector: str = text("tip")
+    offset: list[float] = numbers([0.0, 0.0, 0.0], length=3, unit="m")
+    task: list[str] = choices(["x", "y"], "x", "y", "z")
+    q_init: list[float] = numbers([0.0, 0.327, -0.754], unit="rad")
+    locked: dict[str, float] = mapping(any_number)
+
+
+@dataclass(frozen=True)
+class LineConfig:
+    """`path=line`: straight, `length` m along `direction`."""
+
+    length: float = number(0.4, above=0, unit="m")
+    direction: float | list[float] = angle_or_vector(157.5)
+    start: list[float] | None = numbers(None, unit="m")
+
+
+@dataclass(frozen=True)
+class CircleConfig:
+    """`path=circle`: through the start, centre `radius` m away along `center_direction`; `angle` deg of it."""
+
+    radius: float = number(0.05, above=0, unit="m")
+    center_direction: float | list[float] = angle_or_vector(180.0)
+    clockwise: bool = switch(False)
+    angle: float = number(360.0, above=0, unit="deg")
+    normal: list[float] = numbers([0.0, 0.0, 1.0], length=3)
+    start: list[float] | None = numbers(None, unit="m")
+
+
+@dataclass(frozen=True)
+class WaypointsConfig:
+    """`path=waypoints`: a smooth curve through the rows of a CSV file."""
+
+    file: str = text("")
+    relative: bool = switch(False)
+
+
+@dataclass(frozen=True)
+class TimingConfig:
+    """Group `timing`: the law s(t), the motion time and the number of intervals of the global grid."""
+
+    law: str = choice("raised_cosine", "raised_cosine", "constant_speed", "quintic")
+    duration: float = number(10.0, above=0, unit="s")
+    steps: int = count(100, low=2)
+
+
+@dataclass(frozen=True)
+class ObjectiveConfig:
+    """Group `objective`: which integral is minimised."""
+
+    kind: str = choice("kinetic_energy", "kinetic_energy")
+
+
+@dataclass(frozen=True)
+class LimitsConfig:
+    """Group `limits`: which bounds the motion must keep."""
+
+    kind: str = choice("none", "none")
+
+
+@dataclass(frozen=True)
+class BoundaryConfig:
+    """Group `boundary`: what is prescribed at the ends of the joint motion."""
+
+    kind: str = choice("fixed", "fixed")
+
+
+@dataclass(frozen=True)
+class LsvOptions:
+    """Least-squares velocities: qd = J+ (xd + gain (x_ref - x))."""
+
+    dt: float = number(0.01, above=0, unit="s")
+    integrator: str = choice("heun", "euler", "heun")
+    gain: float = number(0.0, low=0, unit="1/s")
+    singular_value: float = number(0.03, above=0)
+    max_drift: float = number(0.01, above=0, unit="m")
+
+
+@dataclass(frozen=True)
+class PmkeOptions:
+    """Predictive minimisation of the kinetic energy: the parameters of Table 2 of its paper."""
+
+    dt: float = number(0.01, above=0, unit="s")
+    prediction_step: float = number(1.0, above=0, unit="s")
+    horizon: int = count(2)
+    update_interval: float = number(0.5, above=0, unit="s")
+    interpolation: str = choice("quintic", "quintic", "cubic")
+    gain: float = number(0.0, low=0, unit="1/s")
+    tolerance: float = number(1e-6, above=0)
+    singular_value: float = number(0.03, above=0)
+    max_drift: float = number(0.01, above=0, unit="m")
+
+
+@dataclass(frozen=True)
+class GlobalOptions:
+    """The interpolation-based Global Kinematic Planner."""
+
+    candidates: int = count(200)
+    starts: int = count(12)
+    coarse_steps: int = count(25, low=2)
+    tolerance: float = number(1e-8, above=0)
+    max_iterations: int = count(300)
+    same_path: float = number(0.02, above=0, unit="rad")
+
+
+@dataclass(frozen=True)
+class MethodConfig:
+    """Group `method`: the options of every method; the key `methods` says which of them run."""
+
+    lsv: LsvOptions = part(LsvOptions)
+    pmke: PmkeOptions = part(PmkeOptions)
+    global_: GlobalOptions = part(GlobalOptions)
+
+
+@dataclass(frozen=True)
+class PublishedConfig:
+    """Printed numbers that a run is compared against: data for the tables, never used in solving."""
+
+    document: str = text("")
+    kinetic_energy_integral: dict[str, float] = mapping(any_number)
+    singular_time: dict[str, float] = mapping(any_number)
+
+
+@dataclass(frozen=True)
+class RunConfig:
+    """Everything that one run needs."""
+
+    name: str = text("run")
+    methods: list[str] = choices(METHODS, *METHODS)
+    seed: int = count(1, low=0)
+    robot: RobotConfig = part(RobotConfig)
+    path: LineConfig | CircleConfig | WaypointsConfig = one_of(
+        {"line": LineConfig, "circle": CircleConfig, "waypoints": WaypointsConfig}, "line"
+    )
+    timing: TimingConfig = part(TimingConfig)
+    objective: ObjectiveConfig = part(ObjectiveConfig)
+    limits: LimitsConfig = part(LimitsConfig)
+    boundary: BoundaryConfig = part(BoundaryConfig)
+    method: MethodConfig = part(MethodConfig)
+    published: PublishedConfig = part(PublishedConfig)
+
+
+def check(values: Mapping[str, Any]) -> RunConfig:
+    """The checked configuration of one run; raises ConfigError naming the key and what is allowed."""
+    return build(RunConfig, values)

@@ -1,0 +1,220 @@
+"""Every reported number, recomputed from q(t) and the arm alone: nothing here comes from a solver.
+
+The plant is a single arm loaded on its own, evaluated knot by knot through Drake's own energy, torque and pose calls,
+so that a mistake in the stacked evaluations or their scaling cannot hide.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.math import RigidTransform
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import FixedOffsetFrame, JacobianWrtVariable, MultibodyForces
+from scipy.interpolate import CubicSpline
+
+from pipeline.arm import Arm
+from pipeline.arrays import Array
+from pipeline.problem import Boundary, Problem, Solution, Status, Trajectory
+
+BETWEEN = 10  # sub-intervals per knot interval on which the motion between knots is judged
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """One motion and all that is known of it. Shapes: N + 1 knots, n joints; SI units.
+
+    Velocities, accelerations and torques are backward differences at the knots (Global paper Section 4): the sum
+    1/2 qd_i' M(q_i) qd_i dt_i is the kinetic-energy integral that the documents print.
+    """
+
+    solution: Solution
+    status: Status
+    message: str
+    time: Array  # (N + 1,)
+    q: Array  # (N + 1, n)
+    qd: Array  # (N + 1, n)
+    qdd: Array  # (N + 1, n)
+    tau: Array  # (N + 1, n)
+    power: Array  # (N + 1, n) |tau qd|
+    position: Array  # (N + 1, 3) end effector in the world
+    skeleton: Array  # (N + 1, n + 1, 3) joint origins and end effector
+    tracking_error: Array  # (N + 1,)
+    kinetic_energy: Array  # (N + 1,) T
+    energy_integral: Array  # (N + 1,) of T, running
+    torque_integral: Array  # (N + 1,) of tau'tau, running
+    singular_value: Array  # (N + 1,) smallest of the task Jacobian
+    spectral_radius: Array  # (N + 1,) of M
+    energy_integral_spline: float  # of the cubic spline through the knots, independent of the grid's quadrature
+    tracking_error_between: float  # largest between knots, along that spline
+
+    @property
+    def method(self) -> str:
+        return self.solution.method
+
+    @property
+    def label(self) -> str:
+        """`global`, `global 2`, ...: the method and, from the second on, its optimum."""
+        return self.method if self.solution.optimum == 1 else f"{self.method} {self.solution.optimum}"
+
+    @property
+    def confirmed(self) -> bool:
+        """Whether the run may call itself successful: a baseline that meets a singularity has done its work."""
+        return self.status in (Status.SOLVED, Status.SINGULAR)
+
+
+def evaluate(problem: Problem, solution: Solution) -> Evaluation:
+    """Recompute everything about `solution`; a motion that breaks its method's promise gets the status UNCONFIRMED."""
+    arm, task, trajectory = problem.task.arm, problem.task, solution.trajectory
+    time, q = trajectory.time, trajectory.q
+    dt = np.diff(time)
+    qd, qdd = differences(trajectory, problem.boundary, problem.reference.timing.at_rest)
+    plant = _Plant(arm)
+    count, n = q.shape
+    tau, energy, radius = np.empty((count, n)), np.empty(count), np.empty(count)
+    skeleton, singular = np.empty((count, n + 1, 3)), np.empty(count)
+    for i in range(count):
+        plant.at(q[i], qd[i])
+        energy[i] = plant.kinetic_energy()
+        tau[i] = plant.torque(qdd[i])
+        radius[i] = np.linalg.eigvalsh(plant.mass_matrix())[-1]
+        skeleton[i] = plant.skeleton()
+        singular[i] = np.linalg.svd(plant.jacobian()[task.rows], compute_uv=False)[-1]
+    # At the first knot nothing has been spent yet: the interval's values stand at its end.
+    tau[0] = tau[0] if problem.boundary is Boundary.CYCLIC else 0.0
+    position = skeleton[:, -1]
+    tracking = np.linalg.norm(position[:, task.rows] - problem.reference.position(time), axis=1)
+    spline_integral, between = _between_knots(problem, plant, trajectory, qd[0])
+
+    status, message = solution.status, solution.message
+    if status is Status.SOLVED:
+        status, message = _judge(q, tracking, solution)
+    return Evaluation(
+        solution=solution,
+        status=status,
+        message=message,
+        time=time,
+        q=q,
+        qd=qd,
+        qdd=qdd,
+        tau=tau,
+        power=np.abs(tau * qd),
+        position=position,
+        skeleton=skeleton,
+        tracking_error=tracking,
+        kinetic_energy=energy,
+        energy_integral=_running(energy, dt),
+        torque_integral=_running((tau**2).sum(axis=1), dt),
+        singular_value=singular,
+        spectral_radius=radius,
+        energy_integral_spline=spline_integral,
+        tracking_error_between=between,
+    )
+
+
+def differences(trajectory: Trajectory, boundary: Boundary, at_rest: bool) -> tuple[Array, Array]:
+    """qd, qdd (N + 1, n) by backward differences: qd_i = (q_i - q_(i-1)) / dt_i, qdd_i = (qd_i - qd_(i-1)) / dt_i.
+
+    qd_0 is zero for a motion from rest, qd_N for a cyclic one, and qd_1 for a path that is entered at speed.
+    """
+    dt = np.diff(trajectory.time)[:, None]
+    step = np.diff(trajectory.q, axis=0) / dt
+    if boundary is Boundary.CYCLIC:
+        first = step[-1]
+    else:
+        first = np.zeros_like(step[0]) if at_rest else step[0]
+    qd = np.vstack([first, step])
+    change = np.diff(qd, axis=0) / dt
+    return qd, np.vstack([change[-1] if boundary is Boundary.CYCLIC else np.zeros_like(first), change])
+
+
+def _running(rate: Array, dt: Array) -> Array:
+    return np.concatenate([[0.0], np.cumsum(rate[1:] * dt)])
+
+
+def _judge(q: Array, tracking: Array, solution: Solution) -> tuple[Status, str]:
+    if not np.all(np.isfinite(q)):
+        return Status.UNCONFIRMED, "the motion holds values that are not finite"
+    worst = int(np.argmax(tracking))
+    if tracking[worst] > solution.tracking_tolerance:
+        return Status.UNCONFIRMED, (
+            f"the end effector is {tracking[worst]:.2e} m off its path at t = {solution.trajectory.time[worst]:.2f} s; "
+            f"{solution.method} promises {solution.tracking_tolerance:.0e} m"
+        )
+    return Status.SOLVED, solution.message
+
+
+def _between_knots(problem: Problem, plant: _Plant, trajectory: Trajectory, qd_start: Array) -> tuple[float, float]:
+    """The kinetic-energy integral (Simpson) and the largest tracking error of the cubic spline through the knots."""
+    if not np.all(np.isfinite(trajectory.q)):
+        return float("nan"), float("nan")
+    rest = problem.reference.timing.at_rest and problem.boundary is not Boundary.CYCLIC
+    ends = ((1, qd_start), (1, np.zeros_like(qd_start))) if rest else "not-a-knot"
+    if len(trajectory.time) < 4:
+        return float("nan"), float("nan")
+    spline = CubicSpline(trajectory.time, trajectory.q, bc_type=ends)
+    rows = problem.task.rows
+    fraction = np.linspace(0.0, 1.0, BETWEEN + 1)
+    weights = np.array([1.0, *([4.0, 2.0] * (BETWEEN // 2))[:-1], 1.0]) / (3 * BETWEEN)
+    dt = np.diff(trajectory.time)
+    moments = (trajectory.time[:-1, None] + dt[:, None] * fraction).ravel()
+    q, qd, x_ref = spline(moments), spline(moments, 1), problem.reference.position(moments)
+    energy, error = np.empty(len(moments)), np.empty(len(moments))
+    for i in range(len(moments)):
+        plant.at(q[i], qd[i])
+        energy[i] = plant.kinetic_energy()
+        error[i] = np.linalg.norm(plant.tip()[rows] - x_ref[i])
+    return float(energy.reshape(len(dt), -1) @ weights @ dt), float(error.max())
+
+
+class _Plant:
+    """One arm in a plant of its own."""
+
+    def __init__(self, arm: Arm) -> None:
+        description = arm.description
+        self.plant = MultibodyPlant(0.0)
+        (model,) = Parser(self.plant).AddModelsFromString(description.xml, "urdf")
+        if description.base != "world":
+            self.plant.WeldFrames(self.plant.world_frame(), self.plant.GetFrameByName(description.base, model))
+        link = self.plant.GetFrameByName(description.end_effector, model)
+        self.end = self.plant.AddFrame(FixedOffsetFrame("evaluated_point", link, RigidTransform(arm.offset), model))
+        self.plant.mutable_gravity_field().set_gravity_vector(np.zeros(3))
+        self.plant.Finalize()
+        self.joints = [self.plant.GetJointByName(name, model) for name in description.joints]
+        self.order = np.array([joint.position_start() for joint in self.joints])
+        self.context = self.plant.CreateDefaultContext()
+        self.forces = MultibodyForces(self.plant)
+
+    def _scatter(self, values: Array) -> Array:
+        out = np.zeros(len(self.order))
+        out[self.order] = values
+        return out
+
+    def at(self, q: Array, qd: Array) -> None:
+        self.plant.SetPositionsAndVelocities(self.context, np.concatenate([self._scatter(q), self._scatter(qd)]))
+
+    def kinetic_energy(self) -> float:
+        return float(self.plant.CalcKineticEnergy(self.context))
+
+    def torque(self, qdd: Array) -> Array:
+        return np.asarray(self.plant.CalcInverseDynamics(self.context, self._scatter(qdd), self.forces))[self.order]
+
+    def mass_matrix(self) -> Array:
+        return np.asarray(self.plant.CalcMassMatrix(self.context))[np.ix_(self.order, self.order)]
+
+    def tip(self) -> Array:
+        return np.asarray(self.end.CalcPoseInWorld(self.context).translation())
+
+    def skeleton(self) -> Array:
+        return np.array(
+            [joint.frame_on_child().CalcPoseInWorld(self.context).translation() for joint in self.joints] + [self.tip()]
+        )
+
+    def jacobian(self) -> Array:
+        world = self.plant.world_frame()
+        jacobian = self.plant.CalcJacobianTranslationalVelocity(
+            self.context, JacobianWrtVariable.kV, self.end, np.zeros(3), world, world
+        )
+        return np.asarray(jacobian)[:, self.order]

@@ -1,0 +1,82 @@
+"""Velocity-level building blocks that several methods share: pseudoinverses, path projection, singularities."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from pipeline.arrays import Array
+from pipeline.errors import PathError
+from pipeline.problem import Solution, Status, Trajectory
+from pipeline.task import PositionTask
+
+
+def pseudoinverse(jacobian: Array) -> Array:
+    """J+ (..., n, m) of J (..., m, n): the least-squares right inverse J'(J J')^-1, by singular values."""
+    return np.linalg.pinv(jacobian, rcond=1e-12)
+
+
+def weighted_pseudoinverse(jacobian: Array, inverse_weight: Array) -> Array:
+    """W^-1 J'(J W^-1 J')^-1 (..., n, m): least qd'W qd (Global paper eq. (10); Whitney 1969)."""
+    right = inverse_weight @ np.swapaxes(jacobian, -1, -2)
+    return np.asarray(right @ np.linalg.inv(jacobian @ right))
+
+
+def project(
+    task: PositionTask,
+    q: Array,
+    x_ref: Array,
+    inverse_weight: Array | None = None,
+    *,
+    tolerance: float = 1e-12,
+    max_iterations: int = 30,
+) -> tuple[Array, Array]:
+    """Move each q (K, n) onto its task point x_ref (K, m) by Newton steps; returns q and the distance left (K,) [m]."""
+    q = q.copy()
+    error = np.full(len(q), np.inf)
+    for _ in range(max_iterations):
+        x, jacobian = task.value_and_jacobian(q)
+        gap = x_ref - x
+        error = np.linalg.norm(gap, axis=1)
+        if not np.any(error > tolerance):
+            break
+        if inverse_weight is None:
+            inverse = pseudoinverse(jacobian)
+        else:
+            inverse = weighted_pseudoinverse(jacobian, inverse_weight)
+        step = np.einsum("knm,km->kn", inverse, gap)
+        # Near a singular configuration a Newton step can be arbitrarily long; half a radian is far on any arm.
+        size = np.linalg.norm(step, axis=1, keepdims=True)
+        q += step * np.minimum(1.0, 0.5 / np.maximum(size, 1e-300))
+    return q, error
+
+
+def place(task: PositionTask, q_init: Array, start: Array) -> Array:
+    """The configuration near q_init (n,) whose end effector is at `start` (m,); raises PathError if there is none."""
+    q, error = project(task, q_init[None], start[None])
+    if error[0] > 1e-10:
+        raise PathError(
+            f"the path's start ({', '.join(f'{v:.4g}' for v in start)}) m is out of reach: the arm comes within {error[0]:.3g} m of it from robot.q_init"
+        )
+    return q[0]
+
+
+class SingularityWatch:
+    """Follows the smallest singular value of J, relative to the largest, and reports where it was too small."""
+
+    def __init__(self, threshold: float, max_drift: float) -> None:
+        self.threshold, self.max_drift, self.time, self.smallest = threshold, max_drift, 0.0, np.inf
+
+    def see(self, time: float, jacobian: Array) -> None:
+        values = np.linalg.svd(jacobian, compute_uv=False)
+        ratio = float(values[-1] / values[0])
+        if ratio < self.smallest:
+            self.time, self.smallest = float(time), ratio
+
+    def judge(self, method: str, trajectory: Trajectory, statistics: dict[str, Any]) -> Solution:
+        statistics = {**statistics, "smallest_singular_value_ratio": self.smallest}
+        if self.smallest >= self.threshold:
+            return Solution(method, trajectory, Status.SOLVED, tracking_tolerance=self.max_drift, statistics=statistics)
+        message = f"singular at t = {self.time:.2f} s (smallest singular value {self.smallest:.1e} of the largest)"
+        return Solution(method, trajectory, Status.SINGULAR, message, event_time=self.time, statistics=statistics)

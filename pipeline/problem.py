@@ -1,0 +1,113 @@
+"""The data that flows through one run: what is asked (Problem) and what comes back (Solution)."""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from pipeline.arrays import Array
+from pipeline.path import Reference
+from pipeline.task import PositionTask
+
+Progress = Callable[[int, int, float], None]  # (done, all, best cost so far)
+
+
+class Status(enum.Enum):
+    """How a method ended; the value is the sentence that a user reads."""
+
+    SOLVED = "solved: the motion follows the path and the method's own conditions hold"
+    SINGULAR = "singular: the method ran into a singular configuration; its motion is not to be used from there on"
+    NOT_CONVERGED = "not converged: the solver stopped before its conditions held; try more iterations or more starts"
+    INFEASIBLE = "infeasible: no motion was found that meets the path and every limit"
+    UNCONFIRMED = "unconfirmed: the motion recomputed from q(t) does not do what the method claims"
+
+    @property
+    def word(self) -> str:
+        return self.value.split(":")[0]
+
+
+@dataclass(frozen=True)
+class Objective:
+    """A convex combination of integrals: weight of the kinetic energy and of the squared joint torques."""
+
+    kinetic_energy: float = 1.0
+    torque: float = 0.0
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Bounds (n,) on joint motion; infinite where there are none. Units: rad, rad/s, N m, W."""
+
+    lower: Array
+    upper: Array
+    velocity: Array
+    torque: Array
+    power: Array
+
+    @classmethod
+    def none(cls, n: int) -> Limits:
+        free = np.full(n, np.inf)
+        return cls(-free, free, free, free, free)
+
+
+class Boundary(enum.Enum):
+    """What is prescribed of the joint motion at its ends."""
+
+    FIXED = "fixed"  # q(0) given
+    FREE = "free"  # q(0) chosen on the self-motion manifold of the start
+    CYCLIC = "cyclic"  # q(T) = q(0), qd(T) = qd(0)
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Follow `reference` with the arm of `task`, at least cost, within limits.
+
+    q_init: (n,) [rad] the initial configuration (for boundary `free` and `cyclic`: the one that starts are drawn from).
+    times: (N + 1,) [s] the knots of the grid on which a global solution is wanted.
+    """
+
+    task: PositionTask
+    reference: Reference
+    q_init: Array
+    times: Array
+    objective: Objective = field(default_factory=Objective)
+    limits: Limits | None = None
+    boundary: Boundary = Boundary.FIXED
+
+    @property
+    def bounds(self) -> Limits:
+        return self.limits if self.limits is not None else Limits.none(self.task.arm.n)
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """A joint motion: time (N + 1,) [s], q (N + 1, n) [rad]. Everything else is computed from these two."""
+
+    time: Array
+    q: Array
+
+
+@dataclass(frozen=True)
+class Solution:
+    """What a method returns: its motion, how it ended, and statistics of the solver (never used for reporting costs).
+
+    `optimum` counts distinct optima of one method from 1 on. `event_time` [s] is when a singularity was met.
+    `tracking_tolerance` [m] is what the method promises to keep of the path at its knots; the evaluation checks it.
+    """
+
+    method: str
+    trajectory: Trajectory
+    status: Status
+    message: str = ""
+    optimum: int = 1
+    event_time: float | None = None
+    tracking_tolerance: float = np.inf
+    statistics: dict[str, Any] = field(default_factory=dict)
+
+
+def no_progress(done: int, total: int, best: float) -> None:
+    """Say nothing."""

@@ -1,0 +1,70 @@
+"""The small program of one PMKE prediction: h knots ahead, only the h n whitened velocities unknown.
+
+    q_k = q_(k-1) + dt qd_k,    qd_k = sqrt(E / dt) L_k^-T w_k,    M(q_guess,k) = L_k L_k'.
+
+Positions are eliminated, so the program is smaller than the lifted one and, for the few knots of a window, faster. It
+is built once; `solve` only exchanges the numbers behind it.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from pydrake.solvers import MathematicalProgram
+
+from pipeline import ipopt
+from pipeline.arrays import Array
+from pipeline.differentiable import DifferentiableConstraint, DifferentiableCost
+from pipeline.presolve import quasi_newton
+from pipeline.task import PositionTask
+
+
+class Window:
+    """Minimise the kinetic-energy integral over h intervals of `dt` [s] with the end effector on its path.
+
+    PMKE paper eq. (4): backward differences, the mass matrix at the end of each interval.
+    """
+
+    def __init__(self, task: PositionTask, horizon: int, dt: float) -> None:
+        self.task, self.horizon, self.dt, self.n = task, horizon, dt, task.arm.n
+        self._earlier = np.tri(horizon)[:, :, None, None]
+        self.program = MathematicalProgram()
+        w = self.program.NewContinuousVariables(horizon * self.n, "w")
+        self._rows = DifferentiableConstraint(self._tracking)
+        self.program.AddCost(DifferentiableCost(self._energy), vars=w)
+        self.program.AddConstraint(self._rows, lb=np.zeros(horizon * task.m), ub=np.zeros(horizon * task.m), vars=w)
+
+    def solve(
+        self, q_start: Array, x_ref: Array, guess: Array, *, tolerance: float = 1e-8, **options: Any
+    ) -> tuple[Array, float, ipopt.Outcome, int]:
+        """From q_start (n,) through x_ref (h, m), starting at guess (h, n): q (h, n), energy integral [J s], outcome, iterations."""
+        self._rows.forget()
+        velocity = np.diff(np.vstack([q_start, guess]), axis=0) / self.dt
+        mass = self.task.arm.mass_matrix(guess)
+        energy = 0.5 * self.dt * float(np.einsum("ki,kij,kj->", velocity, mass, velocity))
+        # A window at rest (the path has not begun) has no energy to scale by.
+        self._scale = energy if energy > 0 else 1.0
+        self._q_start, self._x_ref = q_start, x_ref
+        self._to_velocity = np.sqrt(self._scale / self.dt) * np.linalg.inv(np.linalg.cholesky(mass)).transpose(0, 2, 1)
+        w: Array = np.linalg.solve(self._to_velocity, velocity[:, :, None]).ravel()
+        w = quasi_newton(self._energy, self._tracking, w, tolerance=0.1 * tolerance)
+        outcome = ipopt.solve(self.program, w, tolerance=tolerance, **options)
+        q, velocity = self._motion(outcome.x)
+        return q, self.dt * float(self.task.arm.kinetic_energy(q, velocity).sum()), outcome, self._rows.iterations
+
+    def _motion(self, w: Array) -> tuple[Array, Array]:
+        velocity = (self._to_velocity @ w.reshape(self.horizon, self.n, 1))[:, :, 0]
+        return self._q_start + self.dt * velocity.cumsum(axis=0), velocity
+
+    def _energy(self, w: Array) -> tuple[float, Array]:
+        value, by_q, by_velocity = self.task.arm.kinetic_energy_gradient(*self._motion(w))
+        # qd_k moves q_k and every later knot.
+        total = by_velocity + self.dt * by_q[::-1].cumsum(axis=0)[::-1]
+        weight = self.dt / self._scale
+        return weight * float(value.sum()), weight * (total[:, None, :] @ self._to_velocity).ravel()
+
+    def _tracking(self, w: Array) -> tuple[Array, Array]:
+        x, jacobian = self.task.value_and_jacobian(self._motion(w)[0])
+        rows = self.dt * (jacobian[:, None] @ self._to_velocity) * self._earlier  # by knot, earlier interval, m, n
+        return (x - self._x_ref).ravel(), rows.swapaxes(1, 2).reshape(self.horizon * self.task.m, -1)
