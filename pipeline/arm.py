@@ -7,7 +7,8 @@ Sources: PMKE paper Section 2.1, Global paper Section 2; derivatives: see each m
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import FixedOffsetFrame, JacobianWrtVariable, MultibodyForces
 
+from pipeline import urdf
 from pipeline.arrays import Array
 from pipeline.urdf import Description
 
@@ -81,11 +83,24 @@ class Arm:
     `description` comes from `pipeline.urdf.read`; `offset` (3,) [m] moves the end-effector point within its link.
     """
 
-    def __init__(self, description: Description, offset: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> None:
+    def __init__(self, description: Description, offset: Sequence[float] = (0.0, 0.0, 0.0)) -> None:
         self.description = description
         self.offset = np.asarray(offset, dtype=float)
         self.n = len(description.joints)
         self._stacks: dict[int, _Stack] = {}
+
+    @classmethod
+    def from_urdf(
+        cls,
+        file: str | Path,
+        end_effector: str,
+        *,
+        base: str | None = None,
+        offset: Sequence[float] = (0.0, 0.0, 0.0),
+        locked: Mapping[str, float] | None = None,
+    ) -> Arm:
+        """The chain from `base` (the root if None) to the link `end_effector` of a URDF file; raises RobotError."""
+        return cls(urdf.read(file, end_effector, base, locked), offset)
 
     # --- kinematics ---------------------------------------------------------------------------------------------
 

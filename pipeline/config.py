@@ -22,6 +22,7 @@ from pipeline.schema import (
     one_of,
     part,
     switch,
+    table_of_numbers,
     text,
 )
 
@@ -122,7 +123,7 @@ class PmkeOptions:
     update_interval: float = number(0.5, above=0, unit="s")
     interpolation: str = choice("quintic", "quintic", "cubic")
     gain: float = number(0.0, low=0, unit="1/s")
-    tolerance: float = number(1e-6, above=0)
+    tolerance: float = number(1e-8, above=0)
     singular_value: float = number(0.03, above=0)
     max_drift: float = number(0.01, above=0, unit="m")
 
@@ -153,8 +154,8 @@ class PublishedConfig:
     """Printed numbers that a run is compared against: data for the tables, never used in solving."""
 
     document: str = text("")
-    kinetic_energy_integral: dict[str, float] = mapping(any_number)
-    singular_time: dict[str, float] = mapping(any_number)
+    note: str = text("")
+    values: dict[str, dict[str, float]] = mapping(table_of_numbers)
 
 
 @dataclass(frozen=True)

@@ -181,8 +181,13 @@ def read_waypoints(file: str | File, axes: Sequence[str]) -> Array:
 class Timing(Protocol):
     """A law s(t) on [0, duration]."""
 
-    duration: float
-    at_rest: bool  # whether the path starts and ends with zero speed
+    @property
+    def duration(self) -> float:
+        """Motion time T [s]."""
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether the path starts and ends with zero speed."""
 
     def sample(self, t: Array, length: float) -> tuple[Array, Array, Array]:
         """s [m], sd [m/s] and sdd [m/s^2] at t (K,)."""

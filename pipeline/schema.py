@@ -159,6 +159,12 @@ def any_number(value: Any, key: str) -> float:
     return float(_check_number(False, None, None, None, "")(value, key))
 
 
+def table_of_numbers(value: Any, key: str) -> dict[str, float]:
+    if not isinstance(value, Mapping):
+        raise _fail(key, value, "must be a table of numbers")
+    return {str(name): any_number(entry, f"{key}.{name}") for name, entry in value.items()}
+
+
 def part(kind: type) -> Any:
     """A nested dataclass."""
     return dataclasses.field(default_factory=kind, metadata={"part": kind})

@@ -46,7 +46,9 @@ class Window:
         # A window at rest (the path has not begun) has no energy to scale by.
         self._scale = energy if energy > 0 else 1.0
         self._q_start, self._x_ref = q_start, x_ref
-        self._to_velocity = np.sqrt(self._scale / self.dt) * np.linalg.inv(np.linalg.cholesky(mass)).transpose(0, 2, 1)
+        self._to_velocity: Array = np.sqrt(self._scale / self.dt) * np.linalg.inv(np.linalg.cholesky(mass)).transpose(
+            0, 2, 1
+        )
         w: Array = np.linalg.solve(self._to_velocity, velocity[:, :, None]).ravel()
         w = quasi_newton(self._energy, self._tracking, w, tolerance=0.1 * tolerance)
         outcome = ipopt.solve(self.program, w, tolerance=tolerance, **options)

@@ -21,7 +21,9 @@ from pipeline.transcription import Transcription
 TRACKING = 1e-8  # [m] what an optimum must keep at every knot
 
 
-def solve(problem: Problem, options: GlobalOptions, seed: int, progress: Progress = no_progress) -> list[Solution]:
+def solve(
+    problem: Problem, options: GlobalOptions = GlobalOptions(), seed: int = 1, progress: Progress = no_progress
+) -> list[Solution]:
     """All distinct optima found, best first; a single failed Solution if there is none."""
     grids = refinement(problem.times, options.coarse_steps)
     rng = np.random.default_rng(seed)

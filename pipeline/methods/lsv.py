@@ -13,7 +13,7 @@ from pipeline.kinematics import SingularityWatch, pseudoinverse
 from pipeline.problem import Problem, Solution, Trajectory
 
 
-def solve(problem: Problem, options: LsvOptions) -> Solution:
+def solve(problem: Problem, options: LsvOptions = LsvOptions()) -> Solution:
     """Integrate from q_init with steps of options.dt; a singular configuration on the way is reported with its time."""
     task, reference = problem.task, problem.reference
     steps = max(1, round(reference.duration / options.dt))

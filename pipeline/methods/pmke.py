@@ -19,7 +19,7 @@ from pipeline.problem import Problem, Solution, Status, Trajectory
 from pipeline.shooting import Window
 
 
-def solve(problem: Problem, options: PmkeOptions) -> Solution:
+def solve(problem: Problem, options: PmkeOptions = PmkeOptions()) -> Solution:
     """Steps 1-10 of Table 1 from q_init. Statistics hold one entry per prediction: time, wall time, iterations, status."""
     task, reference = problem.task, problem.reference
     dt, duration = options.dt, reference.duration

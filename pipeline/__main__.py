@@ -1,0 +1,102 @@
+"""The command line: `python -m pipeline [group=option] [key=value] ...`. Exit code 0: every method confirmed.
+
+1: a method failed or its motion was not confirmed (the summary says which and why). 2: bad input, one line on stderr.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import sys
+from pathlib import Path
+
+import hydra
+from hydra.core.hydra_config import HydraConfig
+from hydra.errors import HydraException, MissingConfigException
+from omegaconf import DictConfig
+from omegaconf.errors import OmegaConfBaseException
+
+from pipeline import session
+from pipeline.errors import InputError, OutputError
+from pipeline.schema import unknown_key
+
+CONF = str(Path(__file__).resolve().parent.parent / "conf")
+
+
+def job(values: DictConfig) -> int:
+    """One run, alone or within a sweep; never raises for bad input, so that a sweep goes on."""
+    from pipeline import run
+    from pipeline.artifacts import tables
+
+    folder = Path(HydraConfig.get().runtime.output_dir)
+    try:
+        code = run.run_and_write(session.checked(values), folder)
+    except InputError as error:
+        print(f"error: {error}", file=sys.stderr)
+        tables.write_failure(folder, values.get("name", ""), str(error))
+        code = 2
+    session.exit_code = max(session.exit_code, code)
+    return code
+
+
+def main() -> int:
+    """Parse, run, and turn every foreseeable error into one line."""
+    # Hydra then hands its errors to us instead of printing pages and leaving with 1.
+    os.environ["HYDRA_FULL_ERROR"] = "1"
+    try:
+        hydra.main(version_base="1.3", config_path=CONF, config_name="config")(job)()
+    except InputError as error:
+        return _complain(str(error))
+    except (HydraException, OmegaConfBaseException) as error:
+        return _complain(_in_one_line(error))
+    except OSError as error:
+        return _complain(str(OutputError(f"cannot write {error.filename!s}: {error.strerror}")))
+    except KeyboardInterrupt:
+        return _complain("interrupted", 130)
+    return session.exit_code
+
+
+def _complain(message: str, code: int = 2) -> int:
+    print(f"error: {message}", file=sys.stderr)
+    return code
+
+
+def _in_one_line(error: Exception) -> str:
+    """Name the key and the allowed values of a composition error."""
+    if isinstance(error, MissingConfigException) and error.missing_cfg_file:
+        group, _, option = error.missing_cfg_file.rpartition("/")
+        allowed = ", ".join(sorted(error.options or []))
+        return f"{group or 'config'} = {option}: no such option; allowed: {allowed or 'see conf/'}"
+    message = str(error.__cause__ or error)
+    unknown = re.search(r"Could not (?:override|append to config\.?[^']*|find) '([^']+)'", str(error))
+    if unknown:
+        return str(unknown_key(unknown.group(1), _keys_beside(unknown.group(1))))
+    return " ".join(line.strip() for line in message.splitlines() if line.strip() and not line.startswith("See http"))
+
+
+def _keys_beside(key: str) -> list[str]:
+    """The keys that may stand where `key` does not: those of the composed configuration at the same place."""
+    from hydra import compose, initialize_config_dir
+    from hydra.core.global_hydra import GlobalHydra
+    from omegaconf import OmegaConf
+
+    groups = [
+        word for word in sys.argv[1:] if re.fullmatch(r"\+?[a-z_/]+=[\w,]+", word) and "." not in word.split("=")[0]
+    ]
+    GlobalHydra.instance().clear()
+    with initialize_config_dir(CONF, version_base="1.3"):
+        try:
+            composed = compose("config", overrides=[word for word in groups if word.split("=")[0] != key])
+        except (HydraException, OmegaConfBaseException):
+            composed = compose("config")
+    parent, _, _ = key.rpartition(".")
+    while parent:
+        there = OmegaConf.select(composed, parent)
+        if isinstance(there, DictConfig):
+            return [str(name) for name in there if name != "kind"]
+        parent = parent.rpartition(".")[0]
+    return [str(name) for name in composed]
+
+
+if __name__ == "__main__":
+    sys.exit(main())

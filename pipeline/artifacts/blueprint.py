@@ -1,0 +1,145 @@
+"""How a recording opens: arms and summary on the left, energies of all motions in the middle, joints on the right."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+
+from pipeline.arrays import Array
+from pipeline.artifacts import style
+
+BACKGROUND = (255, 255, 255)  # the colours of style.py are made for white
+GRID = (120, 120, 120, 60)
+ENERGIES = {
+    "energy_integral": "Kinetic-energy integral [J s]",
+    "kinetic_energy": "Kinetic energy T [J]",
+}
+CHECKS = {
+    "tracking_error": "Tracking error [m]",
+    "singular_value": "Smallest singular value",
+    "spectral_radius": "Spectral radius of M",
+}
+
+
+def slug(label: str) -> str:
+    """The entity of a motion, one path element: `global 2` -> `global_2`."""
+    return "".join(letter if letter.isalnum() or letter in "-_" else "_" for letter in label)
+
+
+def build(
+    labels: Sequence[str],
+    points: Array,
+    revolute: Sequence[bool],
+    planar: bool,
+    ranges: Mapping[str, tuple[float, float]],
+) -> rrb.Blueprint:
+    """The layout for the motions `labels`; the cameras take in `points` (P, 3) [m], all of the scene.
+
+    revolute: (n,) which joints turn; it decides on the units in the titles.
+    ranges: the lowest and highest value to show of an entity such as `kinetic_energy`; others show all there is.
+    """
+    arms = _space(labels, points, planar)
+    if planar:
+        arms = rrb.Tabs(_plane(labels, points), arms, name="Arms")
+    summary = rrb.TextDocumentView(origin="/summary", name="Summary")
+    compared = {
+        entity: _compare(labels, entity, title, ranges.get(entity)) for entity, title in (ENERGIES | CHECKS).items()
+    }
+    checks = rrb.Tabs(*[compared[entity] for entity in CHECKS], name="Checks")
+    joints = rrb.Tabs(*[_joints(label, revolute) for label in labels], name="Joints")
+    return rrb.Blueprint(
+        rrb.Horizontal(
+            rrb.Vertical(arms, summary, row_shares=[5, 3]),
+            rrb.Vertical(*[compared[entity] for entity in ENERGIES], checks, row_shares=[1, 1, 1]),
+            joints,
+            column_shares=[5, 4, 4],
+        ),
+        rrb.TimePanel(state="collapsed", timeline="time", play_state="paused", loop_mode="all"),
+        rrb.SelectionPanel(state="hidden"),
+        rrb.BlueprintPanel(state="hidden"),
+        auto_views=False,
+        auto_layout=False,
+    )
+
+
+def _space(labels: Sequence[str], points: Array, planar: bool) -> Any:
+    """A 3-D view of everything; a planar arm is seen from steeply above, others from the side."""
+    center = (points.min(axis=0) + points.max(axis=0)) / 2
+    size = max(float(np.linalg.norm(points - center, axis=1).max()), 1e-6)
+    direction = np.array([0.15, -0.75, 1.0] if planar else [1.0, -1.2, 0.7])
+    eye = center + 2.1 * size * direction / np.linalg.norm(direction)  # a sphere of `size` fills the field of view
+    return rrb.Spatial3DView(
+        origin="/",
+        contents=["/reference", *(f"/{slug(label)}/**" for label in labels)],
+        name="Arms (3-D)",
+        background=BACKGROUND,
+        line_grid=rrb.LineGrid3D(visible=True, spacing=10.0 ** np.floor(np.log10(size)) / 2, color=GRID),
+        eye_controls=rrb.EyeControls3D(position=eye, look_target=center, eye_up=(0.0, 0.0, 1.0)),
+    )
+
+
+def _plane(labels: Sequence[str], points: Array) -> Any:
+    """The view from above. Rerun's 2-D views have y pointing down, so everything in `/planar` is logged with -y."""
+    low, high = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
+    margin = 0.08 * max(float((high - low).max()), 1e-6)
+    return rrb.Spatial2DView(
+        origin="/planar",
+        contents=["/planar/reference", *(f"/planar/{slug(label)}/**" for label in labels)],
+        name="Arms (plane)",
+        background=BACKGROUND,
+        visual_bounds=rrb.VisualBounds2D(
+            x_range=(low[0] - margin, high[0] + margin), y_range=(-high[1] - margin, -low[1] + margin)
+        ),
+    )
+
+
+def _compare(labels: Sequence[str], entity: str, title: str, shown: tuple[float, float] | None) -> Any:
+    return rrb.TimeSeriesView(
+        origin="/",
+        contents=[f"/{slug(label)}/{entity}" for label in labels],
+        name=title,
+        axis_y=None if shown is None else rrb.ScalarAxis(range=shown),
+        plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop),
+    )
+
+
+def _joints(label: str, revolute: Sequence[bool]) -> Any:
+    """Positions, velocities and torques of one motion below one another."""
+    turn, slide = any(revolute), not all(revolute)
+    units = {
+        "joint_position": ("Joint positions", "rad", "m"),
+        "joint_velocity": ("Joint velocities", "rad/s", "m/s"),
+        "joint_torque": ("Joint torques", "N m", "N"),
+    }
+    views = [
+        rrb.TimeSeriesView(
+            origin=f"/{slug(label)}/{entity}",
+            name=f"{title} [{', '.join([unit_turn] * turn + [unit_slide] * slide)}]",
+            plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop),
+        )
+        for entity, (title, unit_turn, unit_slide) in units.items()
+    ]
+    return rrb.Vertical(*views, name=style.name(label))
+
+
+def rgba(label: str, alpha: int = 255) -> tuple[int, int, int, int]:
+    """The colour of a motion as Rerun takes it."""
+    red, green, blue = (int(style.color(label)[i : i + 2], 16) for i in (1, 3, 5))
+    return red, green, blue, alpha
+
+
+def faded(label: str, keep: float) -> tuple[int, int, int]:
+    """The colour of a motion mixed with the background: lines know no transparency."""
+    red, green, blue = (
+        round(keep * channel + (1 - keep) * white) for channel, white in zip(rgba(label)[:3], BACKGROUND, strict=True)
+    )
+    return red, green, blue
+
+
+def pixels(size: float) -> Any:
+    """A radius in points of the screen, so that lines are as thick for an arm of any size."""
+    return rr.Radius.ui_points(size)

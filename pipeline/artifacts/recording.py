@@ -1,0 +1,297 @@
+"""One Rerun recording per run: all motions overlaid, moving on one time line, with everything that is known of them.
+
+Entities, for a motion with the slug `lsv`: `/lsv/joint_position`, `joint_velocity`, `joint_torque` (one vector each),
+`/lsv/kinetic_energy`, `energy_integral`, `tracking_error`, `singular_value`, `spectral_radius` (scalars), and the
+pictures `/lsv/stick`, `trace`, `end_effector` and `/lsv/<robot>`. SI units throughout.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import xml.etree.ElementTree as ET
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa  # type: ignore[import-untyped]
+import rerun as rr
+from rerun.chunk import RrdReader
+from rerun.urdf import UrdfTree
+from scipy.spatial.transform import Rotation
+
+from pipeline.arrays import Array
+from pipeline.artifacts import blueprint, style
+from pipeline.artifacts.blueprint import faded, pixels, rgba, slug
+from pipeline.evaluate import Evaluation
+from pipeline.problem import Problem
+
+POSES = 12  # of the stroboscopic picture
+SOLID = 110  # opacity of the arms, of 255: those behind must shine through
+REFERENCE = (190, 190, 190)
+SHAPES = ("Boxes3D", "Cylinders3D", "Capsules3D", "Ellipsoids3D")
+
+_log = logging.getLogger(__name__)
+
+
+def write(
+    file: Path,
+    problem: Problem,
+    evaluations: Sequence[Evaluation],
+    *,
+    name: str,
+    summary: str,
+    properties: Mapping[str, Any],
+) -> None:
+    """Write the recording `file` (.rrd) of all `evaluations`, or raise and leave nothing behind.
+
+    summary: Markdown, shown beside the plots. properties: facts of the run, stored as the recording's property `run`.
+    """
+    temporary = file.with_name(f"{file.name}.tmp")
+    try:
+        with _strict(), rr.RecordingStream("selfmotion") as recording:
+            recording.save(temporary, default_blueprint=_layout(problem, evaluations))
+            recording.send_recording_name(name)
+            recording.send_property("run", _facts(properties))
+            document = rr.TextDocument(summary, media_type=rr.MediaType.MARKDOWN)
+            recording.log("summary", document, static=True)
+            _send_reference(recording, problem)
+            for evaluation in evaluations:
+                _send_series(recording, problem, evaluation)
+                _send_motion(recording, problem, evaluation)
+        RrdReader(temporary).store()  # raises without the footer: a disk that fills up at the very end goes unreported
+        os.replace(temporary, file)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def read_series(file: Path, entity: str) -> tuple[Array, Array]:
+    """The time (N,) [s] and the values (N, k) of the scalars on `entity`, for example `/lsv/joint_position`."""
+    times, values = [], []
+    for chunk in RrdReader(file).stream().filter(content=entity, has_timeline="time"):
+        batch = chunk.to_record_batch()
+        times.append(batch["time"].to_numpy(zero_copy_only=False).astype("int64") * 1e-9)
+        values.append(batch["Scalars:scalars"].flatten().to_numpy().reshape(len(batch), -1))
+    if not times:
+        raise KeyError(f"{file}: no series on {entity}")
+    time, value = np.concatenate(times), np.concatenate(values)
+    order = np.argsort(time, kind="stable")
+    return time[order], value[order]
+
+
+@contextmanager
+def _strict() -> Iterator[None]:
+    """Errors in what is logged raise; by default Rerun drops the data with a warning."""
+    before = rr.strict_mode()
+    rr.set_strict_mode(True)
+    try:
+        yield
+    finally:
+        rr.set_strict_mode(before)
+
+
+def _layout(problem: Problem, evaluations: Sequence[Evaluation]) -> Any:
+    points = [np.zeros((1, 3)), _reference(problem)]  # the arm stands at the origin
+    points += [evaluation.skeleton[_finite(evaluation)].reshape(-1, 3) for evaluation in evaluations]
+    labels = [evaluation.label for evaluation in evaluations]
+    revolute = problem.task.arm.description.revolute.tolist()
+    return blueprint.build(labels, np.concatenate(points), revolute, _planar(problem), _ranges(evaluations))
+
+
+def _ranges(evaluations: Sequence[Evaluation]) -> dict[str, tuple[float, float]]:
+    """What to show of the energies: a motion that met a singularity shoots up there and would flatten all the others."""
+    usable = [evaluation for evaluation in evaluations if evaluation.solution.event_time is None]
+    ranges = {}
+    for entity in blueprint.ENERGIES if 0 < len(usable) < len(evaluations) else ():
+        values = np.concatenate([getattr(evaluation, entity)[_finite(evaluation)] for evaluation in usable])
+        high = float(values.max(initial=0.0))
+        if high > 0.0:
+            ranges[entity] = (-0.04 * high, 1.25 * high)
+    return ranges
+
+
+def _planar(problem: Problem) -> bool:
+    return tuple(problem.task.axes) == ("x", "y")
+
+
+def _finite(evaluation: Evaluation) -> Any:
+    """The knots (N + 1,) at which there is a pose to draw: a broken motion may end in values that are not finite."""
+    return np.isfinite(evaluation.skeleton).all(axis=(1, 2)) & np.isfinite(evaluation.q).all(axis=1)
+
+
+def _reference(problem: Problem) -> Array:
+    """The prescribed path (201, 3) [m] in the world; what is not prescribed stays as at `q_init`."""
+    geometry = problem.reference.geometry
+    path = geometry.sample(np.linspace(0.0, geometry.length, 201))[0]
+    return problem.task.in_world(path, problem.task.arm.position(problem.q_init[None])[0])
+
+
+class _Fact:
+    """One value of a property, typed on its own: `rr.AnyValues` holds a key to its first type for the whole process."""
+
+    def __init__(self, value: Any) -> None:
+        self.value = value
+
+    def as_arrow_array(self) -> Any:
+        if not isinstance(self.value, str | Mapping):
+            try:
+                return pa.array(self.value if isinstance(self.value, list | tuple | np.ndarray) else [self.value])
+            except (pa.ArrowException, TypeError, OverflowError):
+                pass
+        return pa.array([str(self.value)])
+
+
+def _facts(properties: Mapping[str, Any]) -> list[Any]:
+    return [
+        rr.DescribedComponentBatch(_Fact(value), rr.ComponentDescriptor(key))
+        for key, value in properties.items()
+        if value is not None
+    ]
+
+
+def _columns(time: Array) -> list[Any]:
+    """The time line: rounded, because Rerun cuts seconds off to whole nanoseconds."""
+    return [rr.TimeColumn("time", duration=np.rint(time * 1e9).astype("timedelta64[ns]"))]
+
+
+def _send_reference(recording: Any, problem: Problem) -> None:
+    path = _reference(problem)
+    look = {"colors": REFERENCE, "radii": pixels(3.0)}  # wide and pale: it stays visible under the traces
+    recording.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+    recording.log("reference", rr.LineStrips3D([path], **look), static=True)
+    if _planar(problem):
+        recording.log("planar/reference", rr.LineStrips2D([_flat(path)], draw_order=20.0, **look), static=True)
+
+
+def _send_series(recording: Any, problem: Problem, evaluation: Evaluation) -> None:
+    time, label, root = _columns(evaluation.time), evaluation.label, slug(evaluation.label)
+    joints = list(problem.task.arm.description.joints)
+    colors = [style.joint_color(j) for j in range(len(joints))]
+    vectors = {"joint_position": evaluation.q, "joint_velocity": evaluation.qd, "joint_torque": evaluation.tau}
+    scalars = {
+        "kinetic_energy": evaluation.kinetic_energy,
+        "energy_integral": evaluation.energy_integral,
+        "tracking_error": evaluation.tracking_error,
+        "singular_value": evaluation.singular_value,
+        "spectral_radius": evaluation.spectral_radius,
+    }
+    for entity, values in vectors.items():
+        lines = rr.SeriesLines(names=joints, colors=[_channels(color) for color in colors], widths=2.0)
+        recording.log(f"{root}/{entity}", lines, static=True)
+        recording.send_columns(f"{root}/{entity}", time, rr.Scalars.columns(scalars=values))
+    event = evaluation.solution.event_time
+    legend = style.name(label) + ("" if event is None else f" (singular at {event:.2f} s)")
+    for entity, values in scalars.items():
+        lines = rr.SeriesLines(names=legend, colors=rgba(label), widths=2.0)
+        recording.log(f"{root}/{entity}", lines, static=True)
+        recording.send_columns(f"{root}/{entity}", time, rr.Scalars.columns(scalars=values))
+
+
+def _channels(color: str) -> tuple[int, ...]:
+    return tuple(int(color[i : i + 2], 16) for i in (1, 3, 5))
+
+
+def _send_motion(recording: Any, problem: Problem, evaluation: Evaluation) -> None:
+    rows = _finite(evaluation)
+    if not rows.any():
+        return
+    root, label, time = slug(evaluation.label), evaluation.label, _columns(evaluation.time[rows])
+    skeleton = evaluation.skeleton[rows]
+    _send_arm(recording, problem, evaluation, time, evaluation.q[rows])
+    _send_stick(recording, root, label, time, skeleton, (rr.LineStrips3D, rr.Points3D), {})
+    if _planar(problem):
+        flat, root = _flat(skeleton), f"planar/{root}"
+        _send_stick(recording, root, label, time, flat, (rr.LineStrips2D, rr.Points2D), {"draw_order": 50.0})
+        chosen = np.unique(np.rint(np.linspace(0, len(flat) - 1, POSES)).astype(int))
+        poses = rr.LineStrips2D(list(flat[chosen]), colors=faded(label, 0.3), radii=pixels(0.8), draw_order=10.0)
+        recording.log(f"{root}/poses", poses, static=True)
+
+
+def _send_stick(
+    recording: Any,
+    root: str,
+    label: str,
+    time: list[Any],
+    skeleton: Array,
+    kinds: tuple[Any, Any],
+    extra: dict[str, Any],
+) -> None:
+    """The stick figure (K, n + 1, 2 or 3), its joints, and the end effector with its trace; `kinds`: lines and points."""
+    lines, dots = kinds
+    tip, count = skeleton[:, -1], skeleton.shape[1]
+    shown = {"colors": rgba(label), **extra}
+    recording.log(f"{root}/stick", lines.from_fields(radii=pixels(2.0), **shown), static=True)
+    recording.send_columns(f"{root}/stick", time, lines.columns(strips=list(skeleton)))
+    recording.log(f"{root}/joints", dots.from_fields(radii=pixels(3.5), **shown), static=True)
+    joints = dots.columns(positions=skeleton.reshape(-1, skeleton.shape[2])).partition([count] * len(skeleton))
+    recording.send_columns(f"{root}/joints", time, joints)
+    recording.log(f"{root}/trace", lines([tip], radii=pixels(1.2), **shown), static=True)
+    recording.log(f"{root}/end_effector", dots.from_fields(radii=pixels(5.0), **shown), static=True)
+    recording.send_columns(f"{root}/end_effector", time, dots.columns(positions=tip))
+
+
+def _flat(points: Array) -> Array:
+    """World points (..., 3) in a 2-D view (..., 2), which has y pointing down."""
+    return points[..., :2] * np.array([1.0, -1.0])
+
+
+def _send_arm(recording: Any, problem: Problem, evaluation: Evaluation, time: list[Any], q: Array) -> None:
+    """The user's own picture of the arm in the colour of the method; without one the stick figure must do."""
+    description, root = problem.task.arm.description, slug(evaluation.label)
+    try:
+        tree = UrdfTree.from_file_path(description.file, entity_path_prefix=root, frame_prefix=f"{root}/")
+        chunks = [
+            c for c in tree.stream(include_joint_transforms=False) if "/collision_geometries/" not in c.entity_path
+        ]
+        joints = {joint.name: joint for joint in tree.joints()}
+        moving = [
+            joints[name].compute_transform_columns(column, clamp=False)
+            for name, column in zip(description.joints, q.T, strict=True)
+        ]
+    except Exception as error:
+        _log.warning("%s cannot be drawn (%s): the recording shows stick figures only", description.file, error)
+        return
+    recording.send_chunks(chunks)
+    for entity, shape in _shapes(chunks):
+        if shape == "Asset3D":
+            recording.log(entity, rr.Asset3D.from_fields(albedo_factor=rgba(evaluation.label, SOLID)), static=True)
+        else:
+            solid = getattr(rr, shape).from_fields(colors=[rgba(evaluation.label, SOLID)], fill_mode="solid")
+            recording.log(entity, solid, static=True)
+    base = rr.Transform3D(parent_frame="tf#/", child_frame=f"{root}/{description.base}")
+    recording.log(f"{root}/tf/base", base, static=True)  # without it an arm with frames of its own is not shown
+    for joint, transform in _rigid(description.xml, description.joints, root):
+        recording.log(_transform(root, joint), transform, static=True)
+    for joint, columns in zip(description.joints, moving, strict=True):
+        recording.send_columns(_transform(root, joint), time, columns)
+
+
+def _transform(root: str, joint: str) -> str:
+    return rr.new_entity_path([root, "tf", "joints", joint])
+
+
+def _shapes(chunks: Iterable[Any]) -> set[tuple[str, str]]:
+    """The (entity, archetype) pairs that have a colour to set."""
+    names = {(c.entity_path, column.split(":")[0]) for c in chunks for column in c.to_record_batch().schema.names}
+    return {(entity, shape) for entity, shape in names if shape in (*SHAPES, "Asset3D")}
+
+
+def _rigid(xml: str, moving: Sequence[str], root: str) -> Iterator[tuple[str, Any]]:
+    """The joints that do not move, from the reduced URDF: there, locked ones stand at the positions they are locked at."""
+    for joint in ET.fromstring(xml).findall("joint"):
+        name, origin, parent, child = joint.get("name", ""), *map(joint.find, ("origin", "parent", "child"))
+        if name in moving or parent is None or child is None:
+            continue
+        values = {} if origin is None else origin.attrib
+        xyz, rpy = (np.array(values.get(key, "0 0 0").split(), dtype=float) for key in ("xyz", "rpy"))
+        yield (
+            name,
+            rr.Transform3D(
+                translation=xyz,
+                quaternion=Rotation.from_euler("xyz", rpy).as_quat(),
+                parent_frame=f"{root}/{parent.get('link')}",
+                child_frame=f"{root}/{child.get('link')}",
+            ),
+        )

@@ -1,0 +1,49 @@
+"""Colours and names that every picture of a run shares: one colour per method, one per joint, readable on white."""
+
+from __future__ import annotations
+
+METHOD_COLORS = {
+    "lsv": "#D9601A",
+    "pmke": "#2B6CB0",
+    "global": "#2F855A",
+    "calculus_of_variations": "#6B46C1",
+    "dynamic_programming": "#5A6472",
+    "pontryagin": "#C53030",
+}
+METHOD_NAMES = {
+    "lsv": "LSV",
+    "pmke": "PMKE",
+    "global": "Global optimum",
+    "calculus_of_variations": "Calculus of variations",
+    "dynamic_programming": "Dynamic programming",
+    "pontryagin": "Pontryagin",
+}
+# Joints 1, 2, 3 are blue, red and yellow in the papers; the others keep apart from them and from one another.
+JOINT_COLORS = ("#1F5FBF", "#C62828", "#D9A400", "#2E8B57", "#7B3FA0", "#00838F", "#8D5524", "#D81B7A", "#5A6472")
+UNKNOWN = "#44403C"
+
+
+def _split(label: str) -> tuple[str, int]:
+    """`global 2` -> `global`, 2; a label without a number is the first optimum of its method."""
+    method, _, number = label.rpartition(" ")
+    return (method, int(number)) if method and number.isdigit() else (label, 1)
+
+
+def color(label: str) -> str:
+    """The colour `#RRGGBB` of a motion: its method's, and lighter for every further optimum."""
+    method, optimum = _split(label)
+    base = METHOD_COLORS.get(method, UNKNOWN)
+    keep = max(0.75 ** (optimum - 1), 0.35)
+    channels = (int(base[i : i + 2], 16) for i in (1, 3, 5))
+    return "#" + "".join(f"{round(255 - keep * (255 - channel)):02X}" for channel in channels)
+
+
+def name(label: str) -> str:
+    """The name of a motion for legends and titles: `Global optimum 2`."""
+    method, optimum = _split(label)
+    return METHOD_NAMES.get(method, method) + (f" {optimum}" if optimum > 1 else "")
+
+
+def joint_color(joint: int) -> str:
+    """The colour `#RRGGBB` of joint 0, 1, ...: the table is run through again after its end."""
+    return JOINT_COLORS[joint % len(JOINT_COLORS)]

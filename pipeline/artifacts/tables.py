@@ -1,0 +1,241 @@
+"""The tables of a run and of a sweep: summary.csv, summary.md, trajectories.parquet, run.json, sweep.csv, sweep.md."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from pipeline.config import PublishedConfig, RunConfig
+from pipeline.evaluate import Evaluation
+from pipeline.problem import Problem, Solution
+
+UNITS = {
+    "kinetic_energy_integral": "J s",
+    "kinetic_energy_integral_spline": "J s",
+    "torque_integral": "N² m² s",
+    "max_tracking_error": "m",
+    "max_tracking_error_between": "m",
+    "peak_velocity": "rad/s",
+    "peak_torque": "N m",
+    "peak_power": "W",
+    "min_spectral_radius": "kg m²",
+    "min_spectral_radius_time": "s",
+    "singular_time": "s",
+    "wall_time_s": "s",
+}
+
+
+def summary(
+    evaluations: Sequence[Evaluation], wall_times: Mapping[str, float], published: PublishedConfig
+) -> pd.DataFrame:
+    """One row per motion; `published_*` and `difference_*` (relative) columns where a document prints the number."""
+    rows = []
+    for evaluation in evaluations:
+        row = _row(evaluation) | {"wall_time_s": wall_times[evaluation.method]}
+        if evaluation.solution.optimum == 1:
+            for column, printed in published.values.get(evaluation.method, {}).items():
+                row[f"published_{column}"] = printed
+                row[f"difference_{column}"] = row[column] / printed - 1 if column in row else np.nan
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def _row(e: Evaluation) -> dict[str, Any]:
+    radius = int(np.argmin(e.spectral_radius))
+    row: dict[str, Any] = {
+        "method": e.method,
+        "optimum": e.solution.optimum,
+        "status": e.status.word,
+        "message": e.message,
+        "kinetic_energy_integral": e.energy_integral[-1],
+        "torque_integral": e.torque_integral[-1],
+        "kinetic_energy_integral_spline": e.energy_integral_spline,
+        "max_tracking_error": e.tracking_error.max(),
+        "max_tracking_error_between": e.tracking_error_between,
+    }
+    for name, values in (("velocity", e.qd), ("torque", e.tau), ("power", e.power)):
+        row |= {f"peak_{name}_{j + 1}": peak for j, peak in enumerate(np.abs(values).max(axis=0))}
+    return row | {
+        "min_singular_value": e.singular_value.min(),
+        "min_spectral_radius": e.spectral_radius[radius],
+        "min_spectral_radius_time": e.time[radius],
+        "singular_time": np.nan if e.solution.event_time is None else e.solution.event_time,
+    }
+
+
+def trajectories(evaluations: Sequence[Evaluation]) -> pd.DataFrame:
+    """The long table: method, optimum, time, q_1..n, qd_1..n, qdd_1..n, tau_1..n, x, y, z."""
+    parts = []
+    for e in evaluations:
+        columns: dict[str, Any] = {"method": e.method, "optimum": e.solution.optimum, "time": e.time}
+        for name, values in (("q", e.q), ("qd", e.qd), ("qdd", e.qdd), ("tau", e.tau)):
+            columns |= {f"{name}_{j + 1}": values[:, j] for j in range(values.shape[1])}
+        columns |= dict(zip("xyz", e.position.T, strict=True))
+        parts.append(pd.DataFrame(columns))
+    return pd.concat(parts, ignore_index=True)
+
+
+def markdown(config: RunConfig, problem: Problem, evaluations: Sequence[Evaluation], table: pd.DataFrame) -> str:
+    """The summary for people: a row per quantity and a column per motion, published values and differences beside."""
+    reference = problem.reference
+    arm = problem.task.arm.description
+    lines = [
+        f"# {config.name}",
+        "",
+        f"{arm.name} ({len(arm.joints)} joints, r = {problem.task.redundancy}), path of {reference.geometry.length:.4g} m "
+        f"in {reference.duration:g} s, {len(problem.times) - 1} intervals, objective {config.objective.kind}, "
+        f"limits {config.limits.kind}, boundary {config.boundary.kind}, seed {config.seed}.",
+        "",
+        *_table(_by_quantity(evaluations, table)),
+        "",
+    ]
+    lines += [f"- **{e.label}**: {e.message or e.status.value}" for e in evaluations]
+    if config.published.document:
+        lines += ["", f"Printed values: {config.published.document}. {config.published.note}".rstrip()]
+    lines += [
+        "",
+        "Integrals are backward-difference sums on each motion's own grid, as in the documents; *spline* is the continuous "
+        "integral of the cubic spline through the knots, free of that quadrature. All values are recomputed from q(t).",
+        "",
+    ]
+    return "\n".join(lines)
+
+
+def _by_quantity(evaluations: Sequence[Evaluation], table: pd.DataFrame) -> list[list[str]]:
+    rows = [["", *(e.label for e in evaluations)]]
+    skipped = ("method", "optimum", "message")
+    for column in table.columns:
+        if column in skipped or column.startswith(("published_", "difference_")) or table[column].isna().all():
+            continue
+        unit = UNITS.get(column, UNITS.get(re.sub(r"_\d+$", "", column), ""))
+        cells = []
+        for row in table.to_dict("records"):
+            printed = row.get(f"published_{column}", np.nan)
+            text = row[column] if isinstance(row[column], str) else "" if pd.isna(row[column]) else f"{row[column]:.4g}"
+            if not pd.isna(printed):
+                text += f" (printed {printed:.4g}, {100 * row[f'difference_{column}']:+.2g} %)"
+            cells.append(text)
+        rows.append([column.removesuffix("_s").replace("_", " ") + (f" [{unit}]" if unit else ""), *cells])
+    return rows
+
+
+def _table(rows: list[list[str]]) -> list[str]:
+    head, *body = ["| " + " | ".join(row) + " |" for row in rows]
+    return [head, "|---|" + "---:|" * (len(rows[0]) - 1), *body]
+
+
+def write(folder: Path, evaluations: Sequence[Evaluation], table: pd.DataFrame, text: str) -> None:
+    """summary.csv, summary.md and trajectories.parquet."""
+    write_beside(folder / "summary.csv", lambda file: table.to_csv(file, index=False))
+    write_beside(folder / "summary.md", lambda file: file.write_text(text, encoding="utf-8"))
+    write_beside(folder / "trajectories.parquet", lambda file: trajectories(evaluations).to_parquet(file, index=False))
+
+
+def write_run(
+    folder: Path,
+    config: RunConfig,
+    facts: Mapping[str, Any],
+    results: Sequence[tuple[list[Solution], float]],
+    evaluations: Sequence[Evaluation],
+    stages: Mapping[str, float],
+) -> None:
+    """run.json: versions, seed, statistics of every solve, timings per stage, machine, the configuration."""
+    solved = [
+        {"method": s.method, "optimum": s.optimum, "status": e.status.word, "statistics": s.statistics}
+        for s, e in zip([s for solutions, _ in results for s in solutions], evaluations, strict=True)
+    ]
+    content = {
+        **facts,
+        "cpu_count": os.cpu_count(),
+        "stages_s": dict(stages),
+        "methods_s": {solutions[0].method: seconds for solutions, seconds in results},
+        "solutions": solved,
+        "config": asdict(config),
+    }
+    write_beside(
+        folder / "run.json",
+        lambda file: file.write_text(json.dumps(content, indent=1, default=_plain), encoding="utf-8"),
+    )
+
+
+def write_failure(folder: Path, name: str, reason: str) -> None:
+    """A run of a sweep that could not be posed leaves its reason, so that the sweep's table has a row for it."""
+    row = pd.DataFrame([{"method": "", "optimum": 0, "status": "bad input", "message": reason}])
+    write_beside(folder / "summary.csv", lambda file: row.to_csv(file, index=False))
+
+
+def write_sweep(folder: Path) -> None:
+    """sweep.csv and sweep.md: the summaries of all runs below `folder`, one row per run and motion."""
+    parts = []
+    for file in sorted(folder.glob("*/summary.csv"), key=lambda file: _natural(file.parent.name)):
+        table = pd.read_csv(file)
+        table.insert(0, "run", file.parent.name)
+        parts.append(table)
+    if not parts:
+        return
+    table = pd.concat(parts, ignore_index=True)
+    write_beside(folder / "sweep.csv", lambda file: table.to_csv(file, index=False))
+    rows = [
+        [
+            "run",
+            "method",
+            "status",
+            "kinetic energy [J s]",
+            "printed",
+            "difference",
+            "torque integral [N² m² s]",
+            "message",
+        ]
+    ]
+    for row in table.to_dict("records"):
+        label = row["method"] if row["optimum"] in (0, 1) else f"{row['method']} {row['optimum']}"
+        printed, difference = (
+            row.get("published_kinetic_energy_integral", np.nan),
+            row.get("difference_kinetic_energy_integral", np.nan),
+        )
+        numbers = [
+            (row.get("kinetic_energy_integral", np.nan), "{:.4g}"),
+            (printed, "{:.4g}"),
+            (100 * difference, "{:+.2g} %"),
+        ]
+        numbers.append((row.get("torque_integral", np.nan), "{:.4g}"))
+        cells = ["" if pd.isna(value) else form.format(value) for value, form in numbers]
+        message = row["message"]
+        rows.append(
+            [row["run"], "" if pd.isna(label) else label, row["status"], *cells, "" if pd.isna(message) else message]
+        )
+    text = "\n".join([f"# Sweep {folder.name}", "", *_table(rows), ""])
+    write_beside(folder / "sweep.md", lambda file: file.write_text(text, encoding="utf-8"))
+    print(f"sweep table in {folder / 'sweep.md'}")
+
+
+def write_beside(file: Path, write: Callable[[Path], Any]) -> None:
+    """Write to a name beside `file` and rename, so that a killed run leaves no half file under a final name."""
+    file.parent.mkdir(parents=True, exist_ok=True)
+    unfinished = file.with_name(f".{file.name}.{os.getpid()}")
+    try:
+        write(unfinished)
+        os.replace(unfinished, file)
+    finally:
+        unfinished.unlink(missing_ok=True)
+
+
+def _natural(name: str) -> tuple[int, str]:
+    number, _, rest = name.partition("_")
+    return (int(number) if number.isdigit() else -1), rest
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.generic):
+        return value.item()
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    return str(value)

@@ -1,0 +1,366 @@
+"""Dynamic programming on a grid of the self-motion manifold (r = 1): the global optimum of the discretised problem.
+
+Every knot's manifold is sampled evenly in arc length (all loops: `self_motion.py`), and Bellman's recursion
+V_i(b) = min_a V_(i-1)(a) + 1/2 d' M(q_b) d / dt_i, with d = q_b - q_a the joint difference of one interval, runs over
+all pairs of nodes, so that it needs no assumption on how the manifold changes along the path. The sum is the
+kinetic-energy integral by backward differences (PMKE paper eq. (4), Global paper eq. (5)). Every path of the grid keeps
+the task at its knots and is feasible for the transcription on the same knots: the cost bounds that program's optimum
+from above, and its excess, the grid error, is of second order in the node spacing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.arrays import Array
+from pipeline.candidates import distinct
+from pipeline.errors import InputError
+from pipeline.problem import Boundary, Problem, Progress, Solution, Status, Trajectory, no_progress
+from pipeline.self_motion import manifolds, wrap
+
+Index = NDArray[np.intp]
+PAIRS = 2**16  # node pairs per batch: what stays in the processor's cache
+TRACKING = 1e-10  # [m] what every node keeps
+STRIDE = 8  # first spacing, in nodes, of the starts that a cyclic problem is solved from
+
+
+@dataclass(frozen=True)
+class DynamicProgrammingOptions:
+    """nodes: of the longest manifold along the path. intervals: of the time grid; None: the problem's own.
+
+    velocity_slack: by how many node spacings a step may exceed a velocity limit (0: every path honours the limits).
+    same_path [rad]: paths closer than this count as one.
+    """
+
+    nodes: int = 360
+    intervals: int | None = 25
+    velocity_slack: float = 0.0
+    same_path: float = 0.2
+
+
+@dataclass(frozen=True)
+class Layer:
+    """The nodes of one knot: q (K, n) [rad], L (K, n, n) with M = L L', whether they are within limits (K,), loop sizes."""
+
+    q: Array
+    root: Array
+    allowed: NDArray[np.bool_]
+    loops: tuple[int, ...]
+
+    def thin(self) -> Layer:
+        """Every other node of every loop; a single node stays."""
+        if self.loops == (1,):
+            return self
+        return Layer(self.q[::2], self.root[::2], self.allowed[::2], tuple(size // 2 for size in self.loops))
+
+
+@dataclass(frozen=True)
+class Grid:
+    """The layers of all knots; `turning` (n,) are the joints whose differences are taken to the nearest turn."""
+
+    times: Array
+    layers: list[Layer]
+    turning: NDArray[np.bool_]
+    step_limit: Array  # (N, n) [rad] largest joint difference
+    spacing: float  # [rad] between nodes
+
+    def thin_nodes(self) -> Grid:
+        return replace(self, layers=[layer.thin() for layer in self.layers], spacing=2 * self.spacing)
+
+    def thin_intervals(self) -> Grid:
+        """Two intervals as one (an odd one at the end stays)."""
+        keep = np.unique([*range(0, len(self.times), 2), len(self.times) - 1])
+        limit = np.add.reduceat(self.step_limit, keep[:-1], axis=0)
+        return replace(self, times=self.times[keep], layers=[self.layers[i] for i in keep], step_limit=limit)
+
+    def steps(self, i: int, nodes: Index | None = None) -> Iterator[tuple[slice, Array]]:
+        """Costs (R, A) [J s] of interval i to R nodes at its end (all, or the given ones) from all A at its start."""
+        before, after = self.layers[i], self.layers[i + 1]
+        q, root = (after.q, after.root) if nodes is None else (after.q[nodes], after.root[nodes])
+        allowed = after.allowed if nodes is None else after.allowed[nodes]
+        factor = root / np.sqrt(2 * (self.times[i + 1] - self.times[i]))
+        start = np.where(before.allowed, 0.0, np.inf)
+        rows = max(1, PAIRS // len(before.q))
+        for first in range(0, len(q), rows):
+            part = slice(first, min(first + rows, len(q)))
+            difference = [
+                _difference(q[part, j, None], before.q[:, j], bool(turns)) for j, turns in enumerate(self.turning)
+            ]
+            cost = np.zeros((part.stop - part.start, len(before.q)))
+            for k in range(len(difference)):
+                whitened = sum(factor[part, j, k, None] * difference[j] for j in range(k, len(difference)))
+                cost += whitened * whitened
+            for j in np.flatnonzero(np.isfinite(self.step_limit[i])):
+                cost[np.abs(difference[j]) > self.step_limit[i, j]] = np.inf
+            cost += start
+            cost[~allowed[part]] = np.inf
+            yield part, cost
+
+
+def _difference(end: Array, start: Array, turning: bool) -> Array:
+    gap = end - start
+    if turning:
+        gap -= 2 * np.pi * np.rint(gap * (0.5 / np.pi))
+    return np.asarray(gap)
+
+
+def solve(problem: Problem, options: DynamicProgrammingOptions, progress: Progress = no_progress) -> list[Solution]:
+    """Distinct grid optima on the grid's own knots, best first; the first is the global one, with its grid error.
+
+    Torque and power limits are not part of a first-order grid: with them the costs are those of a relaxed problem.
+    """
+    times = _intervals(problem, options.intervals)
+    grid = make_grid(problem, times, options.nodes, options.velocity_slack)
+    motions, costs = paths(grid, problem.boundary)
+    kept = _distinct(problem, motions, costs, options.same_path)
+    if not kept:
+        standing = np.tile(problem.q_init, (len(times), 1))
+        message = "no path through the grid keeps the limits; more nodes or fewer intervals make it finer than them"
+        return [Solution("dynamic_programming", Trajectory(times, standing), Status.INFEASIBLE, message)]
+    progress(1, 1, float(costs[kept[0]]))
+    log = {**_errors(grid, problem.boundary, float(costs[kept[0]])), "spacing_rad": grid.spacing}
+    log["loops"] = [len(layer.loops) for layer in grid.layers]
+    return [
+        Solution(
+            "dynamic_programming",
+            Trajectory(times, motions[index]),
+            Status.SOLVED,
+            optimum=rank + 1,
+            tracking_tolerance=TRACKING,
+            statistics={"cost": float(costs[index]), **(log if rank == 0 else {})},
+        )
+        for rank, index in enumerate(kept)
+    ]
+
+
+def starts(problem: Problem, times: Array, nodes: int = 180, same_path: float = 0.2) -> Array:
+    """Motions (K, N + 1, n) [rad] on the knots `times`, best first: one for each valley that the grid shows.
+
+    A velocity limit may be exceeded by one node spacing per step: the solver that starts here will keep it.
+    """
+    motions, costs = paths(make_grid(problem, times, nodes, velocity_slack=1.0), problem.boundary)
+    return motions[_distinct(problem, motions, costs, same_path)]
+
+
+def _distinct(problem: Problem, motions: Array, costs: Array, same_path: float) -> list[int]:
+    """Indices of distinct motions of finite cost, best first; they are shifted by full turns into the limits in place."""
+    revolute, bounds = problem.task.arm.description.revolute, problem.bounds
+    turns = np.where(revolute & np.isfinite(bounds.lower), 2 * np.pi, 0.0)
+    lowest = motions.min(axis=1) - bounds.lower
+    shift = np.where(turns > 0, np.floor((lowest + 1e-9) / (2 * np.pi)), 0.0)
+    motions -= (turns * shift)[:, None]
+    inside = np.all((motions <= bounds.upper + 1e-8) & (motions >= bounds.lower - 1e-8), axis=(1, 2))
+    if problem.boundary is Boundary.FIXED:
+        inside &= np.abs(motions[:, 0] - problem.q_init).max(axis=1, initial=0.0) < 1e-9
+    usable = np.flatnonzero(np.isfinite(costs) & inside)
+    return [int(usable[i]) for i in distinct(motions[usable], costs[usable], len(usable), same_path, revolute)]
+
+
+def _errors(grid: Grid, boundary: Boundary, cost: float) -> dict[str, float]:
+    """How far the best cost is above the limit of a fine grid, by halving: the nodes (twice), then the intervals.
+
+    The excess falls with a power of the spacing that three grids show, between 1 and 2; of the intervals with order 1.
+    """
+
+    def best(of: Grid) -> float:
+        return float(paths(of, boundary)[1].min(initial=np.inf))
+
+    def excess(fine: float, half: float, quarter: float) -> tuple[float, float]:
+        if not np.isfinite([fine, half]).all() or half <= fine:
+            return (float("inf"), 1.0) if half > fine else (0.0, 2.0)
+        order = 1.0 if not np.isfinite(quarter) else float(np.clip(np.log2((quarter - half) / (half - fine)), 1.0, 2.0))
+        return (half - fine) / (2**order - 1), order
+
+    half = grid.thin_nodes()
+    node_error, order = excess(cost, best(half), best(half.thin_nodes()))
+    coarse = grid.thin_intervals()
+    half = coarse.thin_nodes()
+    coarse_cost = best(coarse)
+    coarse_error, _ = excess(coarse_cost, best(half), best(half.thin_nodes()))
+    interval_error = (coarse_cost - coarse_error) - (cost - node_error)
+    return {"grid_error": node_error, "order": order, "interval_error": interval_error}
+
+
+def make_grid(problem: Problem, times: Array, nodes: int, velocity_slack: float = 0.0) -> Grid:
+    """Trace the manifolds of all knots `times` (N + 1,) and evaluate M at their nodes, once each, stacked.
+
+    A joint whose position limits leave less than a turn is represented within them and cannot jump across the gap.
+    """
+    if problem.objective.torque:
+        raise InputError(
+            "dynamic_programming needs an objective of first order, the kinetic energy; a torque integral is not one"
+        )
+    task, bounds = problem.task, problem.bounds
+    revolute = task.arm.description.revolute
+    fixed = problem.boundary is Boundary.FIXED
+    x = problem.reference.position(times)
+    rng = np.random.default_rng(0)
+    cyclic = problem.boundary is Boundary.CYCLIC
+    if cyclic and np.linalg.norm(x[-1] - x[0]) > 1e-9:
+        raise InputError("boundary cyclic: the path does not end where it starts")
+    wanted = x[1:] if fixed else x[:-1] if cyclic else x
+    all_loops = manifolds(task, wanted, rng, nodes=nodes, seeds=problem.q_init[None])
+    first = all_loops[0][0]
+    q = [np.concatenate([loop.q for loop in loops]) for loops in all_loops]
+    sizes = [tuple(len(loop.q) for loop in loops) for loops in all_loops]
+    if fixed:
+        q.insert(0, problem.q_init[None])
+        sizes.insert(0, (1,))
+    span = bounds.upper - bounds.lower
+    turning = revolute & ~(span <= 2 * np.pi)
+    held = revolute & ~turning
+    lower, upper = np.where(held, bounds.lower, 0.0), np.where(turning, np.inf, bounds.upper)
+    flat = np.concatenate(q)
+    flat = np.where(held, lower + np.mod(flat - lower + 1e-9, 2 * np.pi) - 1e-9, flat)
+    within = np.all((flat <= upper + 1e-9) & (flat >= np.where(turning, -np.inf, bounds.lower) - 1e-9), axis=1)
+    root = np.linalg.cholesky(task.arm.mass_matrix(flat))
+    ends = np.cumsum([len(of_knot) for of_knot in q])[:-1]
+    parts = zip(np.split(flat, ends), np.split(root, ends), np.split(within, ends), sizes, strict=True)
+    layers = [Layer(*part) for part in parts]
+    if cyclic:
+        layers.append(layers[0])
+    spacing = first.length / len(first.q)
+    limit = np.diff(times)[:, None] * bounds.velocity * (1 + 1e-9) + velocity_slack * spacing
+    return Grid(times, layers, turning, limit, spacing)
+
+
+def _intervals(problem: Problem, intervals: int | None) -> Array:
+    own = len(problem.times) - 1
+    return np.interp(np.linspace(0, own, min(intervals or own, own) + 1), np.arange(own + 1), problem.times)
+
+
+# --- Bellman's recursion --------------------------------------------------------------------------------------------
+
+
+def forward(grid: Grid, start: Array) -> tuple[Array, list[Index]]:
+    """From values (K_0,) at the first knot: values (K_N,) at the last and the best predecessors, one array per interval."""
+    value, best = start, []
+    for i in range(len(grid.layers) - 1):
+        size = len(grid.layers[i + 1].q)
+        after, chosen = np.empty(size), np.empty(size, dtype=np.intp)
+        for rows, cost in grid.steps(i):
+            cost += value
+            chosen[rows] = cost.argmin(axis=1)
+            after[rows] = cost[np.arange(len(cost)), chosen[rows]]
+        value = after
+        best.append(chosen)
+    return value, best
+
+
+def backward(grid: Grid) -> tuple[Array, list[Index]]:
+    """The same from the end: least costs (K_0,) to go from the first knot, and the best successors."""
+    value, best = np.zeros(len(grid.layers[-1].q)), []
+    for i in range(len(grid.layers) - 2, -1, -1):
+        size = len(grid.layers[i].q)
+        before, chosen = np.full(size, np.inf), np.zeros(size, dtype=np.intp)
+        for rows, cost in grid.steps(i):
+            cost += value[rows, None]
+            row = cost.argmin(axis=0)
+            least = cost[row, np.arange(size)]
+            better = least < before
+            before[better], chosen[better] = least[better], row[better] + rows.start
+        value = before
+        best.insert(0, chosen)
+    return value, best
+
+
+def round_trips(grid: Grid, starts: Index) -> Array:
+    """Least costs (S,) of the closed paths through each of the nodes `starts` (S,) of the first and last knot."""
+    value = np.full((len(starts), len(grid.layers[0].q)), np.inf)
+    value[np.arange(len(starts)), starts] = 0.0
+    last = len(grid.layers) - 2
+    for i in range(last):
+        after = np.empty((len(starts), len(grid.layers[i + 1].q)))
+        for rows, cost in grid.steps(i):
+            for s in range(len(starts)):
+                after[s, rows] = (cost + value[s]).min(axis=1)
+        value = after
+    closing = np.concatenate([cost for _, cost in grid.steps(last, starts)])
+    return np.asarray((closing + value).min(axis=1))
+
+
+def minima(value: Array, loops: tuple[int, ...], reach: int = 1) -> Index:
+    """Nodes (P,) whose finite value is the least of all within `reach` nodes along their loop."""
+    out, first = [], 0
+    for size in loops:
+        part = value[first : first + size]
+        shifts = range(1, min(reach, size - 1) + 1)
+        least = np.isfinite(part)
+        for shift in shifts:
+            least &= (part <= np.roll(part, shift)) & (part < np.roll(part, -shift))
+        out.append(first + np.flatnonzero(least))
+        first += size
+    return np.concatenate(out)
+
+
+# --- paths ----------------------------------------------------------------------------------------------------------
+
+
+def paths(grid: Grid, boundary: Boundary) -> tuple[Array, Array]:
+    """Motions (P, N + 1, n) [rad] through the local minima of the value functions, and their costs (P,) [J s].
+
+    Fixed and free: the minima of the least cost to reach a node of the last knot and, as a second valley may end where
+    a better one does, of the least cost to go from a node of the first. Cyclic: of the closed paths by their start.
+    """
+    if boundary is Boundary.CYCLIC:
+        return _cyclic_paths(grid)
+    arrive, before = forward(grid, np.zeros(len(grid.layers[0].q)))
+    chosen = _backtrack(before, minima(arrive, grid.layers[-1].loops))
+    costs = arrive[chosen[:, -1]]
+    if boundary is Boundary.FREE:
+        leave, after = backward(grid)
+        nodes = [minima(leave, grid.layers[0].loops)]
+        for best in after:
+            nodes.append(best[nodes[-1]])
+        chosen = np.concatenate([chosen, np.stack(nodes, axis=1)])
+        costs = np.concatenate([costs, leave[nodes[0]]])
+    return _unwound(grid, chosen), costs
+
+
+def _cyclic_paths(grid: Grid) -> tuple[Array, Array]:
+    """Starts STRIDE nodes apart, then each local minimum of their costs refined by halving the distance."""
+    layer = grid.layers[0]
+    size = len(layer.q)
+    cost = np.full(size, np.inf)
+    first = np.arange(0, size, STRIDE)
+    cost[first] = round_trips(grid, first)
+    ends = np.cumsum((0, *layer.loops))
+    pieces = tuple(int(((first >= low) & (first < high)).sum()) for low, high in zip(ends[:-1], ends[1:], strict=True))
+    best = first[minima(cost[first], pieces)]
+    low = ends[np.searchsorted(ends, best, side="right") - 1]
+    length = ends[np.searchsorted(ends, best, side="right")] - low
+    tried = np.isin(np.arange(size), first)
+    distance = STRIDE // 2
+    while distance:
+        around = low[:, None] + (best[:, None] - low[:, None] + np.array([-distance, 0, distance])) % length[:, None]
+        new = np.unique(around[~tried[around]])
+        if len(new):
+            cost[new], tried[new] = round_trips(grid, new), True
+        best = around[np.arange(len(best)), cost[around].argmin(axis=1)]
+        distance //= 2
+    chosen = []
+    for node in np.unique(best):
+        start = np.full(size, np.inf)
+        start[node] = 0.0
+        _, before = forward(grid, start)
+        chosen.append(_backtrack(before, np.array([node])))
+    nodes = np.concatenate(chosen) if chosen else np.empty((0, len(grid.layers)), dtype=np.intp)
+    return _unwound(grid, nodes), cost[nodes[:, 0]]
+
+
+def _backtrack(before: list[Index], last: Index) -> Index:
+    nodes = [last]
+    for best in reversed(before):
+        nodes.append(best[nodes[-1]])
+    return np.stack(nodes[::-1], axis=1)
+
+
+def _unwound(grid: Grid, nodes: Index) -> Array:
+    """Continuous joint motions (P, N + 1, n) through node numbers (P, N + 1)."""
+    q = np.stack([layer.q[column] for layer, column in zip(grid.layers, nodes.T, strict=True)], axis=1)
+    change = wrap(np.diff(q, axis=1), grid.turning)
+    return np.concatenate([q[:, :1], q[:, :1] + np.cumsum(change, axis=1)], axis=1)

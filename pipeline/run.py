@@ -1,0 +1,199 @@
+"""The order of one run: configuration -> problem -> methods -> evaluation -> artifacts."""
+
+from __future__ import annotations
+
+import platform
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path as File
+from typing import Any
+
+import numpy as np
+
+from pipeline import config as schema
+from pipeline.arm import Arm
+from pipeline.arrays import Array
+from pipeline.errors import ConfigError, PathError, RobotError
+from pipeline.evaluate import Evaluation, evaluate
+from pipeline.kinematics import place, project
+from pipeline.methods import global_planner, lsv, pmke
+from pipeline.path import (
+    ConstantSpeed,
+    Geometry,
+    Line,
+    Quintic,
+    RaisedCosine,
+    Reference,
+    Spline,
+    Timing,
+    circle,
+    direction_vector,
+    read_waypoints,
+)
+from pipeline.problem import Problem, Progress, Solution
+from pipeline.task import PositionTask
+
+PROJECT = File(__file__).resolve().parent.parent
+TIMINGS: dict[str, Callable[[float], Timing]] = {
+    "raised_cosine": RaisedCosine,
+    "constant_speed": ConstantSpeed,
+    "quintic": Quintic,
+}
+
+
+def prepare(config: schema.RunConfig) -> Problem:
+    """The problem that a configuration states; raises InputError, one line, if it cannot be posed."""
+    robot = config.robot
+    arm = Arm.from_urdf(
+        _find(robot.urdf), robot.end_effector, base=robot.base, offset=robot.offset, locked=robot.locked
+    )
+    task = PositionTask(arm, tuple(robot.task))
+    if len(robot.q_init) != arm.n:
+        names = ", ".join(arm.description.joints)
+        raise RobotError(f"robot.q_init has {len(robot.q_init)} values, the arm has {arm.n} moving joints ({names})")
+    q_init = np.array(robot.q_init)
+    geometry, q_init = _geometry(config.path, task, q_init)
+    reference = Reference(geometry, TIMINGS[config.timing.law](config.timing.duration))
+    times = np.linspace(0.0, config.timing.duration, config.timing.steps + 1)
+    problem = Problem(task, reference, q_init, times)
+    _require_reach(problem)
+    return problem
+
+
+def solve(problem: Problem, config: schema.RunConfig, progress: Progress) -> list[tuple[list[Solution], float]]:
+    """The solutions of each method asked for, in order, with the method's wall time [s]."""
+    options = config.method
+    methods: dict[str, Callable[[], list[Solution]]] = {
+        "lsv": lambda: [lsv.solve(problem, options.lsv)],
+        "pmke": lambda: [pmke.solve(problem, options.pmke)],
+        "global": lambda: global_planner.solve(problem, options.global_, config.seed, progress),
+    }
+    results = []
+    for method in config.methods:
+        begin = time.perf_counter()
+        solutions = methods[method]()
+        results.append((solutions, time.perf_counter() - begin))
+    return results
+
+
+def run_and_write(config: schema.RunConfig, folder: File) -> int:
+    """One whole run into `folder`; returns the exit code."""
+    from pipeline.artifacts import figures, recording, tables
+    from pipeline.console import Console
+
+    stages: dict[str, float] = {}
+    console = Console()
+
+    def timed(stage: str, begin: float) -> None:
+        stages[stage] = round(time.perf_counter() - begin, 4)
+
+    begin = time.perf_counter()
+    problem = prepare(config)
+    timed("prepare", begin)
+
+    begin = time.perf_counter()
+    with console.progress(config.name) as progress:
+        results = solve(problem, config, progress)
+    timed("solve", begin)
+
+    begin = time.perf_counter()
+    evaluations = [evaluate(problem, solution) for solutions, _ in results for solution in solutions]
+    wall_times = {solutions[0].method: seconds for solutions, seconds in results}
+    timed("evaluate", begin)
+
+    begin = time.perf_counter()
+    summary = tables.summary(evaluations, wall_times, config.published)
+    markdown = tables.markdown(config, problem, evaluations, summary)
+    tables.write(folder, evaluations, summary, markdown)
+    timed("tables", begin)
+    begin = time.perf_counter()
+    figures.write(folder / "figures", problem, evaluations, name=config.name)
+    timed("figures", begin)
+    begin = time.perf_counter()
+    facts = {"experiment": config.name, "seed": config.seed, "robot": config.robot.name, **versions()}
+    recording.write(
+        folder / "recording.rrd", problem, evaluations, name=config.name, summary=markdown, properties=facts
+    )
+    timed("recording", begin)
+    tables.write_run(folder, config, facts, results, evaluations, stages)
+    console.report(summary, folder)
+    return 0 if all(evaluation.confirmed for evaluation in evaluations) else 1
+
+
+def versions() -> dict[str, str]:
+    """What the numbers were made with."""
+    from importlib.metadata import PackageNotFoundError, version
+
+    def of(package: str) -> str:
+        try:
+            return version(package)
+        except PackageNotFoundError:
+            return "not installed"
+
+    packages = ("selfmotion", "drake", "numpy", "scipy", "pandas", "rerun-sdk", "hydra-core", "matplotlib")
+    machine = f"{platform.system()} {platform.machine()}"
+    return {"python": sys.version.split()[0], "machine": machine, **{package: of(package) for package in packages}}
+
+
+def _find(urdf: str) -> File:
+    """A robot description by absolute path, or relative to the working directory or else to the project."""
+    given = File(urdf).expanduser()
+    if not given.is_absolute() and not given.is_file() and (PROJECT / given).is_file():
+        return PROJECT / given
+    return given
+
+
+def _geometry(path: Any, task: PositionTask, q_init: Array) -> tuple[Geometry, Array]:
+    """The path's curve, and q_init moved onto its start if the path says where it starts."""
+    here = task.value(q_init[None])[0]
+    if isinstance(path, schema.WaypointsConfig):
+        if path.file in ("", "???"):
+            raise ConfigError("path.file: not given; the way-points are rows of a CSV file, e.g. path.file=points.csv")
+        points = read_waypoints(path.file, task.axes)
+        if path.relative:
+            points = points + here - points[0]
+        return Spline(points), place(task, q_init, points[0])
+    start = here
+    if path.start is not None:
+        if len(path.start) != task.m:
+            raise ConfigError(f"path.start = {path.start}: must be {task.m} numbers m, one for each of robot.task")
+        start = np.array(path.start)
+        q_init = place(task, q_init, start)
+    if isinstance(path, schema.CircleConfig):
+        return (
+            circle(
+                start,
+                path.center_direction,
+                path.radius,
+                clockwise=path.clockwise,
+                normal=path.normal,
+                angle=path.angle,
+            ),
+            q_init,
+        )
+    return Line(start, direction_vector(path.direction, task.m), path.length), q_init
+
+
+def _require_reach(problem: Problem) -> None:
+    """Refuse a path that leaves the arm's reach, saying where along it and by how much."""
+    task, geometry = problem.task, problem.reference.geometry
+    s = np.linspace(0.0, geometry.length, 101)
+    points = geometry.sample(s)[0]
+    # From the nearest of several configurations: one start alone can get stuck although the point can be reached.
+    rng = np.random.default_rng(0)
+    guesses = np.concatenate([problem.q_init[None], rng.uniform(-np.pi, np.pi, (11, task.arm.n))])
+    gap = np.full(len(points), np.inf)
+    for guess in guesses:
+        open_points = gap > 1e-6
+        if not open_points.any():
+            return
+        _, left = project(task, np.tile(guess, (int(open_points.sum()), 1)), points[open_points])
+        gap[open_points] = np.minimum(gap[open_points], left)
+    out = np.flatnonzero(gap > 1e-6)
+    if out.size:
+        worst = int(np.argmax(gap))
+        raise PathError(
+            f"path: out of reach from {s[out[0]]:.3g} m along its {geometry.length:.3g} m on; "
+            f"the arm misses it by up to {gap[worst]:.3g} m (at {s[worst]:.3g} m)"
+        )

@@ -1,0 +1,101 @@
+"""`make bench`: the project's solves beside the same programs in CasADi + IPOPT with exact Hessians, interleaved.
+
+Prints medians and ratios. Nothing is asserted here: timings of a shared machine are no tests.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from pipeline.config import GlobalOptions, PmkeOptions
+from pipeline.methods import global_planner, pmke
+from pipeline.run import PROJECT, prepare
+from pipeline.config import check
+from pipeline.shooting import Window
+from pipeline.transcription import Transcription
+
+sys.path.insert(0, str(Path(__file__).parent))
+import peer  # noqa: E402
+
+REPEATS = 7
+
+
+def timed(call: Callable[[], Any]) -> tuple[float, Any]:
+    begin = time.perf_counter()
+    answer = call()
+    return 1e3 * (time.perf_counter() - begin), answer
+
+
+def report(name: str, ours: list[float], theirs: list[float], note: str) -> None:
+    ratio = np.median(np.array(ours) / np.array(theirs))
+    print(f"{name:<34} {np.median(ours):9.2f} {np.median(theirs):9.2f} {ratio:7.2f}   {note}")
+
+
+def predictions() -> None:
+    """Every prediction of PMKE on trajectory 3, with the guesses of a real run."""
+    problem = prepare(check({}))
+    calls: list[tuple[Any, ...]] = []
+    solve = Window.solve
+
+    def record(self: Window, *arguments: Any, **options: Any) -> Any:
+        calls.append(tuple(np.copy(argument) for argument in arguments))
+        return solve(self, *arguments, **options)
+
+    options = PmkeOptions()
+    Window.solve = record  # type: ignore[method-assign]
+    pmke.solve(problem, options)
+    Window.solve = solve  # type: ignore[method-assign]
+
+    window = Window(problem.task, options.horizon, options.prediction_step)
+    arm = peer.PlanarArm.from_urdf(PROJECT / "robots" / "planar3r.urdf")
+    program = peer.kinetic_energy_program(arm, options.horizon, options.prediction_step, options.tolerance)
+    ours, theirs, gap = [], [], 0.0
+    for _ in range(REPEATS):
+        for call in calls:
+            milliseconds, answer = timed(lambda call=call: window.solve(*call, tolerance=options.tolerance))
+            ours.append(milliseconds)
+            milliseconds, other = timed(lambda call=call: peer.solve(program, *call))
+            theirs.append(milliseconds)
+            gap = max(gap, abs(answer[1] / other[1] - 1))
+    report("PMKE prediction (trajectory 3)", ours, theirs, f"{len(calls)} solves of one run; costs agree to {gap:.0e}")
+
+
+def fine_solve() -> None:
+    """The last stage of the global planner on trajectory 3: 101 points, 303 parameters, started from the stage before."""
+    problem = prepare(check({}))
+    options = GlobalOptions()
+    coarse = global_planner.refinement(problem.times, options.coarse_steps)[-2]
+    rough = global_planner.solve(prepare(check({"timing": {"steps": len(coarse) - 1}})), options)[0]
+    guess = CubicSpline(coarse, rough.trajectory.q)(problem.times)
+    arm = peer.PlanarArm.from_urdf(PROJECT / "robots" / "planar3r.urdf")
+    step = float(problem.times[1])
+    program = peer.kinetic_energy_program(arm, len(problem.times) - 1, step, options.tolerance)
+    path = problem.reference.position(problem.times[1:])
+    ours, theirs = [], []
+    for _ in range(REPEATS):
+        milliseconds, (q, _, iterations) = timed(
+            lambda: Transcription(problem, problem.times, guess).solve(tolerance=options.tolerance)
+        )
+        ours.append(milliseconds)
+        milliseconds, (other, _, statistics) = timed(lambda: peer.solve(program, problem.q_init, path, guess[1:]))
+        theirs.append(milliseconds)
+    gap = np.abs(q[1:] - other).max()
+    note = f"{iterations} and {statistics['iter_count']} iterations; motions agree to {gap:.0e} rad"
+    report("fine global solve (303 parameters)", ours, theirs, note)
+
+
+def main() -> None:
+    print(f"{'medians':<34} {'ours [ms]':>9} {'peer [ms]':>9} {'ratio':>7}")
+    predictions()
+    fine_solve()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,121 @@
+"""Shared by all tests: the papers' planar arm, their trajectories, and the peer's independent formulas for it."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+
+import casadi as ca
+import numpy as np
+import pytest
+from hypothesis import settings
+
+from pipeline import urdf
+from pipeline.arm import Arm
+from pipeline.arrays import Array
+from pipeline.candidates import population
+from pipeline.path import Line, RaisedCosine, Reference, circle, direction_vector
+from pipeline.problem import Problem
+from pipeline.task import PositionTask
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT / "tests" / "benchmarks"))
+from peer import PlanarArm  # noqa: E402
+
+settings.register_profile("project", derandomize=True, deadline=None, max_examples=50)
+settings.load_profile("project")
+
+
+@pytest.fixture(scope="session")
+def planar_file() -> Path:
+    return ROOT / "robots" / "planar3r.urdf"
+
+
+@pytest.fixture(scope="session")
+def arm(planar_file: Path) -> Arm:
+    return Arm(urdf.read(planar_file, "tip"))
+
+
+@pytest.fixture(scope="session")
+def task(arm: Arm) -> PositionTask:
+    return PositionTask(arm)
+
+
+@pytest.fixture
+def q_init() -> Array:
+    return np.array([0.0, 0.327, -0.754])
+
+
+@pytest.fixture
+def rng() -> np.random.Generator:
+    return np.random.default_rng(7)
+
+
+@pytest.fixture
+def reference(task: PositionTask, q_init: Array) -> Callable[[int], Reference]:
+    """Trajectory 1, 2, 3 or 4 of the PMKE paper (10 s)."""
+    start = task.value(q_init[None])[0]
+
+    def make(number: int) -> Reference:
+        if number == 2:
+            return Reference(circle(start, 180.0, 0.05), RaisedCosine(10.0))
+        length, angle = {1: (0.1, 157.5), 3: (0.4, 157.5), 4: (0.7, 202.5)}[number]
+        return Reference(Line(start, direction_vector(angle, 2), length), RaisedCosine(10.0))
+
+    return make
+
+
+@pytest.fixture
+def problem(task: PositionTask, reference: Callable[[int], Reference], q_init: Array) -> Callable[[int, int], Problem]:
+    """The papers' problem on a trajectory, on a grid of so many equal intervals."""
+    return lambda number, intervals: Problem(task, reference(number), q_init, np.linspace(0.0, 10.0, intervals + 1))
+
+
+@pytest.fixture
+def guess() -> Callable[[Problem], Array]:
+    """The inertia-weighted pseudoinverse motion (N + 1, n)."""
+    return lambda problem: population(problem, problem.times, 2, np.random.default_rng(0))[1]
+
+
+@pytest.fixture(scope="session")
+def peer(planar_file: Path) -> SimpleNamespace:
+    """The planar arm written out in CasADi: each member maps stacked rows (K, 3) to stacked results."""
+    planar = PlanarArm.from_urdf(planar_file)
+    q, qd, qdd = (ca.SX.sym(name, 3) for name in ("q", "qd", "qdd"))
+    energy, tip = planar.kinetic_energy(q, qd), planar.end_effector(q)
+    momentum, jacobian = ca.gradient(energy, qd), ca.jacobian(tip, q)
+    bias = ca.jtimes(momentum, q, qd) - ca.gradient(energy, q)  # Lagrange's equations at qdd = 0
+    mass = ca.jacobian(momentum, qd)
+    torque = mass @ qdd + bias
+
+    def stacked(expression: ca.SX) -> Callable[..., Array]:
+        function = ca.Function("f", [q, qd, qdd], [ca.densify(expression)])
+
+        def call(*rows: Array) -> Array:
+            filled = [*rows, *[np.zeros_like(rows[0])] * (3 - len(rows))]
+            values = np.array([np.array(function(*row)) for row in zip(*filled, strict=True)])
+            return values.reshape(len(values), *(size for size in expression.shape if size > 1))
+
+        return call
+
+    return SimpleNamespace(
+        arm=planar,
+        position=stacked(tip),
+        jacobian=stacked(jacobian),
+        jacobian_rate=stacked(ca.jtimes(jacobian @ qd, q, qd)),
+        energy=stacked(energy),
+        energy_by_q=stacked(ca.gradient(energy, q)),
+        mass=stacked(mass),
+        bias=stacked(bias),
+        torque=stacked(torque),
+        torque_by_q=stacked(ca.jacobian(torque, q)),
+        torque_by_qd=stacked(ca.jacobian(torque, qd)),
+    )
+
+
+def differences(function: Callable[[Array], Array], x: Array, step: float = 1e-6) -> Array:
+    """Central differences of function((k,)) -> (...): (..., k)."""
+    columns = [(function(x + step * e) - function(x - step * e)) / (2 * step) for e in np.eye(len(x))]
+    return np.stack(columns, axis=-1)
