@@ -35,7 +35,7 @@ _PUBLIC = {
     "lsv": "pipeline.methods.lsv",
     "pmke": "pipeline.methods.pmke",
     "global_planner": "pipeline.methods.global_planner",
-    "evaluate": "pipeline.evaluate",
+    "evaluate": "pipeline.evaluation",
 }
 __all__ = sorted(_PUBLIC)
 

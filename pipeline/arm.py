@@ -37,9 +37,8 @@ class _Stack:
         order: list[int] = []
         for _ in range(size):
             (model,) = parser.AddModelsFromString(description.xml, "urdf")
-            base = plant.GetFrameByName(description.base, model)
-            if description.base != "world":
-                plant.WeldFrames(plant.world_frame(), base)
+            if description.base != "world":  # which Drake takes for its own world
+                plant.WeldFrames(plant.world_frame(), plant.GetFrameByName(description.base, model))
             tip = plant.GetFrameByName(description.end_effector, model)
             if np.any(offset):
                 tip = plant.AddFrame(FixedOffsetFrame("end_effector_point", tip, RigidTransform(offset), model))

@@ -1,16 +1,75 @@
-"""Starts for the global planner: a population of weighted-pseudoinverse motions, ranked, and the sorting of optima.
+"""Starts for the global planner: initial configurations, a population of motions, their ranking, distinct basins.
 
-Global paper Section 3: qd = W^-1 J'(J W^-1 J')^-1 xd with random symmetric positive definite W (eqs (9)-(11)).
+Global paper Sections 3.1.2 and 3.1.3: qd = W^-1 J'(J W^-1 J')^-1 xd with random symmetric positive definite W (eqs
+(9)-(11)), from initial configurations spread by random self-motion (eq. (17)).
 """
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import norm, qmc
 
 from pipeline.arrays import Array
-from pipeline.kinematics import project
-from pipeline.problem import Problem
+from pipeline.costs import objective_values
+from pipeline.kinematics import project, pseudoinverse
+from pipeline.problem import Boundary, Problem
+from pipeline.task import PositionTask
+
+SELF_MOTION_STEPS = 24
+
+
+def initial_configurations(
+    task: PositionTask,
+    q_init: Array,
+    count: int,
+    rng: np.random.Generator,
+    *,
+    draw: str = "normal",
+    spread: float = 2.0,
+) -> Array:
+    """Configurations (<= count, n) with the end effector of q_init (n,), reached from it by random self-motion.
+
+    Eq. (17): qd = (I - J+ J) p for one unit of time, p (n,) [rad] with standard deviation `spread`, drawn from a normal
+    distribution or a Latin hypercube. Each is closed on the end effector to 1e-10 m, wrapped and kept once; the first
+    is q_init itself.
+    """
+    n = task.arm.n
+    if draw == "normal":
+        perturbation = rng.normal(scale=spread, size=(count - 1, n))
+    else:
+        perturbation = spread * norm.ppf(qmc.LatinHypercube(n, rng=rng).random(count - 1))
+    x = task.value(q_init[None])
+    q = np.tile(q_init, (count - 1, 1))
+
+    def slope(q: Array) -> Array:
+        jacobian = task.jacobian(q)
+        along = np.einsum("kmn,kn->km", jacobian, perturbation)
+        return perturbation - np.einsum("knm,km->kn", pseudoinverse(jacobian), along)
+
+    step = 1.0 / SELF_MOTION_STEPS
+    for _ in range(SELF_MOTION_STEPS if count > 1 else 0):
+        middle = slope(q + step / 2 * slope(q))
+        q = q + step * middle
+    if count > 1:
+        q, error = project(task, q, np.tile(x, (count - 1, 1)))
+        q = q[error < 1e-10]
+    q = wrap(np.vstack([q_init, q]), task.arm.description.revolute)
+    return unique(q, task.arm.description.revolute)
+
+
+def wrap(q: Array, revolute: NDArray[np.bool_]) -> Array:
+    """Angles in [-pi, pi), prismatic positions as they are."""
+    return np.where(revolute, (q + np.pi) % (2 * np.pi) - np.pi, q)
+
+
+def unique(q: Array, revolute: NDArray[np.bool_], same: float = 1e-3) -> Array:
+    """Rows of q (K, n) without those that repeat an earlier one within `same` [rad], full turns not counted."""
+    kept: list[int] = []
+    for index in range(len(q)):
+        if not kept or np.abs(wrap(q[kept] - q[index], revolute)).max(axis=1).min() > same:
+            kept.append(index)
+    return q[kept]
 
 
 def random_inverse_weights(rng: np.random.Generator, count: int, n: int) -> Array:
@@ -21,50 +80,103 @@ def random_inverse_weights(rng: np.random.Generator, count: int, n: int) -> Arra
     return np.asarray(np.einsum("kij,kj,klj->kil", basis, 1.0 / np.maximum(eigenvalues, 1e-3), basis))
 
 
-def population(problem: Problem, times: Array, count: int, rng: np.random.Generator) -> Array:
-    """Joint motions (K, N + 1, n) from q_init that stay on the path at every knot; K <= count, failures are left out.
+def population(problem: Problem, times: Array, starts: Array, count: int, rng: np.random.Generator) -> Array:
+    """Motions (K, N + 1, n) that stay on the path at every knot; K <= count: those that lose it are left out.
 
-    The first two are the plain and the inertia-weighted pseudoinverse, the others have random constant weights.
+    They are spread evenly over the initial configurations `starts` (C, n); of each, the first is the inertia-weighted
+    and the second the plain pseudoinverse, the others have random constant weights.
     """
     arm = problem.task.arm
-    constant = random_inverse_weights(rng, max(0, count - 2), arm.n)
     x_ref = problem.reference.position(times)
-    motions = np.empty((count, len(times), arm.n))
-    motions[:, 0] = problem.q_init
+    which = np.arange(count) % len(starts)
+    turn = np.arange(count) // len(starts)
+    constant = random_inverse_weights(rng, count, arm.n)
+    constant[turn == 1] = np.eye(arm.n)
+    motions: Array = np.empty((count, len(times), arm.n))
+    motions[:, 0] = starts[which]
     alive = np.ones(count, dtype=bool)
+    by_inertia = np.flatnonzero(turn == 0)
     for i in range(1, len(times)):
-        inertia = np.linalg.inv(arm.mass_matrix(motions[1:2, i - 1]))
-        weights = np.concatenate([np.eye(arm.n)[None], inertia, constant])[:count]
-        target = np.tile(x_ref[i], (count, 1))
-        motions[:, i], error = project(
-            problem.task, motions[:, i - 1], target, weights, tolerance=1e-9, max_iterations=12
+        constant[by_inertia] = np.linalg.inv(arm.mass_matrix(motions[by_inertia, i - 1]))
+        rows = np.flatnonzero(alive)
+        if not rows.size:
+            break
+        target = np.tile(x_ref[i], (len(rows), 1))
+        motions[rows, i], error = project(
+            problem.task, motions[rows, i - 1], target, constant[rows], tolerance=1e-9, max_iterations=12
         )
-        alive &= error < 1e-6
-    return motions[alive]
+        alive[rows] = error < 1e-6
+    motions = motions[alive]
+    if problem.boundary is Boundary.CYCLIC and len(motions):
+        motions = _close(problem, times, motions)
+    return motions
 
 
-def kinetic_energy_integrals(problem: Problem, times: Array, motions: Array) -> Array:
-    """Cost (K,) [J s] of each motion (K, N + 1, n), backward differences."""
-    dt = np.diff(times)
-    velocity = np.diff(motions, axis=1) / dt[:, None]
-    count, intervals, n = velocity.shape
-    energy = problem.task.arm.kinetic_energy(motions[:, 1:].reshape(-1, n), velocity.reshape(-1, n))
-    return np.asarray(energy.reshape(count, intervals) @ dt)
+def _close(problem: Problem, times: Array, motions: Array) -> Array:
+    """Spread the gap between end and start of each motion over its knots, and put the knots back on the path."""
+    revolute = problem.task.arm.description.revolute
+    gap = wrap(motions[:, -1] - motions[:, 0], revolute)
+    ramp = np.linspace(0.0, 1.0, len(times))[:, None]
+    # A motion that comes back wound by a full turn is not closed by this; it stays as it is and its gap decides.
+    moved = motions - ramp * gap[:, None, :]
+    count, knots, n = moved.shape
+    target = np.tile(problem.reference.position(times), (count, 1))
+    closed, error = project(problem.task, moved.reshape(-1, n), target, tolerance=1e-9)
+    closed = closed.reshape(moved.shape)
+    fine = (error.reshape(count, knots).max(axis=1) < 1e-6) & (np.abs(closed[:, -1] - closed[:, 0]).max(axis=1) < 1e-6)
+    return closed[fine]
+
+
+def ranking(problem: Problem, times: Array, motions: Array, limit_weight: float) -> Array:
+    """Cost (K,) of each motion plus the distance from the joint limits, eq. (14), over the joints that have limits."""
+    limits = problem.bounds
+    span = limits.upper - limits.lower
+    cost = objective_values(problem, times, motions)
+    limited = np.isfinite(span)
+    if limited.any():
+        middle = (limits.upper + limits.lower)[limited] / 2
+        distance = ((motions[:, :, limited] - middle) / span[limited]) ** 2
+        cost = cost + limit_weight * distance.sum(axis=(1, 2)) / motions.shape[2]
+    return cost
+
+
+def starting_points(problem: Problem, count: int, rng: np.random.Generator, draw: str, spread: float) -> Array:
+    """The initial configurations a boundary allows: q_init alone, or those spread by self-motion."""
+    if problem.boundary is Boundary.FIXED:
+        return problem.q_init[None]
+    return initial_configurations(problem.task, problem.q_init, count, rng, draw=draw, spread=spread)
 
 
 def path_distance(a: Array, b: Array, revolute: NDArray[np.bool_]) -> float:
     """Largest joint difference [rad] between two motions (N + 1, n) on the same knots, full turns not counted."""
-    gap = a - b
-    wrapped = np.where(revolute, (gap + np.pi) % (2 * np.pi) - np.pi, gap)
-    return float(np.abs(wrapped).max())
+    return float(np.abs(wrap(a - b, revolute)).max())
 
 
 def distinct(motions: Array, costs: Array, most: int, same: float, revolute: NDArray[np.bool_]) -> list[int]:
     """Indices of the cheapest motions, best first, no two closer than `same` [rad]; at most `most`."""
+    return _pick([], motions, costs, most, same, revolute)
+
+
+def diverse(motions: Array, costs: Array, most: int, same: float, revolute: NDArray[np.bool_]) -> list[int]:
+    """Indices of `most` cheap motions that are spread out: first the best of those far apart, then nearer ones.
+
+    The cheapest alone lie all around one optimum: on the Global paper's line the best 48 of 1521 lead to the same one.
+    """
     kept: list[int] = []
+    radius = 1.6  # [rad]
+    while len(kept) < most and radius > same / 2:
+        kept = _pick(kept, motions, costs, most, radius, revolute)
+        radius /= 2
+    return kept
+
+
+def _pick(
+    kept: list[int], motions: Array, costs: Array, most: int, apart: float, revolute: NDArray[np.bool_]
+) -> list[int]:
+    kept = list(kept)
     for index in np.argsort(costs, kind="stable"):
-        if len(kept) == most:
+        if len(kept) >= most:
             break
-        if all(path_distance(motions[index], motions[other], revolute) > same for other in kept):
+        if not kept or np.abs(wrap(motions[kept] - motions[index], revolute)).max(axis=(1, 2)).min() > apart:
             kept.append(int(index))
     return kept

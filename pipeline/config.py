@@ -16,11 +16,13 @@ from pipeline.schema import (
     choice,
     choices,
     count,
+    intervals,
     mapping,
     number,
     numbers,
     one_of,
     part,
+    per_joint,
     switch,
     table_of_numbers,
     text,
@@ -79,27 +81,39 @@ class TimingConfig:
     law: str = choice("raised_cosine", "raised_cosine", "constant_speed", "quintic")
     duration: float = number(10.0, above=0, unit="s")
     steps: int = count(100, low=2)
+    dense: list[list[float]] = intervals()
 
 
 @dataclass(frozen=True)
 class ObjectiveConfig:
     """Group `objective`: which integral is minimised."""
 
-    kind: str = choice("kinetic_energy", "kinetic_energy")
+    kind: str = choice("kinetic_energy", "kinetic_energy", "torque", "weighted")
+    kinetic_energy: float = number(1.0, low=0, high=1)
+    torque: float = number(0.0, low=0, high=1)
 
 
 @dataclass(frozen=True)
 class LimitsConfig:
-    """Group `limits`: which bounds the motion must keep."""
+    """Group `limits`: which bounds the motion must keep.
 
-    kind: str = choice("none", "none")
+    `kind` says which of the robot description's own limits hold (joint: position and velocity; joint_torque_power:
+    torque too, and the power given here); a value given here (one, or one per joint) overrides or adds to them.
+    """
+
+    kind: str = choice("none", "none", "joint", "joint_torque_power")
+    lower: float | list[float] | None = per_joint(unit="rad")
+    upper: float | list[float] | None = per_joint(unit="rad")
+    velocity: float | list[float] | None = per_joint(above=0, unit="rad/s")
+    torque: float | list[float] | None = per_joint(above=0, unit="N m")
+    power: float | list[float] | None = per_joint(above=0, unit="W")
 
 
 @dataclass(frozen=True)
 class BoundaryConfig:
     """Group `boundary`: what is prescribed at the ends of the joint motion."""
 
-    kind: str = choice("fixed", "fixed")
+    kind: str = choice("fixed", "fixed", "free", "cyclic")
 
 
 @dataclass(frozen=True)
@@ -130,14 +144,26 @@ class PmkeOptions:
 
 @dataclass(frozen=True)
 class GlobalOptions:
-    """The interpolation-based Global Kinematic Planner."""
+    """The interpolation-based Global Kinematic Planner; counts as in its paper."""
 
-    candidates: int = count(200)
-    starts: int = count(12)
-    coarse_steps: int = count(25, low=2)
+    starts: str = choice("population", "population", "dynamic_programming", "both")
+    configurations: int = count(66)
+    draw: str = choice("normal", "normal", "latin_hypercube")
+    spread: float = number(2.0, above=0, unit="rad")
+    candidates: int | None = count(None)
+    optimised: int = count(48)
+    limit_weight: float = number(0.01, low=0)
+    coarse_steps: int = count(13, low=2)
     tolerance: float = number(1e-8, above=0)
     max_iterations: int = count(300)
-    same_path: float = number(0.02, above=0, unit="rad")
+    same_path: float = number(0.05, above=0, unit="rad")
+
+
+@dataclass(frozen=True)
+class ParallelConfig:
+    """Group `parallel`: how independent solves are spread."""
+
+    workers: int | None = count(None)
 
 
 @dataclass(frozen=True)
@@ -174,6 +200,7 @@ class RunConfig:
     limits: LimitsConfig = part(LimitsConfig)
     boundary: BoundaryConfig = part(BoundaryConfig)
     method: MethodConfig = part(MethodConfig)
+    parallel: ParallelConfig = part(ParallelConfig)
     published: PublishedConfig = part(PublishedConfig)
 
 

@@ -14,26 +14,6 @@ from pipeline.arrays import Array
 # Drake warns on the console about solves that end early; the status says it, and every caller reports the status.
 logging.getLogger("drake").setLevel(logging.ERROR)
 
-# IPOPT's return codes (IpReturnCodes.h), as sentences for the summary.
-STATUS = {
-    0: "optimal",
-    1: "optimal to the acceptable tolerance only",
-    2: "locally infeasible",
-    3: "search direction became too small",
-    4: "iterates diverge",
-    5: "stopped by the user",
-    6: "feasible point found",
-    -1: "iteration limit reached",
-    -2: "restoration failed",
-    -3: "error in the step computation",
-    -4: "time limit reached",
-    -10: "too few degrees of freedom",
-    -11: "invalid problem",
-    -12: "invalid option",
-    -13: "not a number in a function or derivative",
-    -100: "unrecoverable exception",
-}
-
 
 @dataclass(frozen=True)
 class Outcome:
@@ -77,7 +57,6 @@ def solve(
     start = time.perf_counter()
     result = solver.Solve(program, guess, options)
     wall_time = time.perf_counter() - start
-    code = int(result.get_solver_details().status)
-    return Outcome(
-        result.GetSolution(program.decision_variables()), code == 0, STATUS.get(code, f"IPOPT code {code}"), wall_time
-    )
+    details = result.get_solver_details()
+    x = result.GetSolution(program.decision_variables())
+    return Outcome(x, details.status == 0, details.ConvertStatusToString().lower(), wall_time)

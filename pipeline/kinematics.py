@@ -20,7 +20,8 @@ def pseudoinverse(jacobian: Array) -> Array:
 def weighted_pseudoinverse(jacobian: Array, inverse_weight: Array) -> Array:
     """W^-1 J'(J W^-1 J')^-1 (..., n, m): least qd'W qd (Global paper eq. (10); Whitney 1969)."""
     right = inverse_weight @ np.swapaxes(jacobian, -1, -2)
-    return np.asarray(right @ np.linalg.inv(jacobian @ right))
+    # The pseudoinverse of the inner matrix lets an exactly singular configuration pass.
+    return np.asarray(right @ np.linalg.pinv(jacobian @ right, rcond=1e-12, hermitian=True))
 
 
 def project(
@@ -32,23 +33,31 @@ def project(
     tolerance: float = 1e-12,
     max_iterations: int = 30,
 ) -> tuple[Array, Array]:
-    """Move each q (K, n) onto its task point x_ref (K, m) by Newton steps; returns q and the distance left (K,) [m]."""
+    """Move each q (K, n) onto its task point x_ref (K, m) by Newton steps; returns q and the distance left (K,) [m].
+
+    `inverse_weight` (K, n, n) shapes the steps (see weighted_pseudoinverse); None: least joint displacement.
+    """
     q = q.copy()
     error = np.full(len(q), np.inf)
+    rows = np.arange(len(q))  # those that are not there yet
     for _ in range(max_iterations):
-        x, jacobian = task.value_and_jacobian(q)
-        gap = x_ref - x
-        error = np.linalg.norm(gap, axis=1)
-        if not np.any(error > tolerance):
+        x, jacobian = task.value_and_jacobian(q[rows])
+        gap = x_ref[rows] - x
+        error[rows] = np.sqrt((gap * gap).sum(axis=1))
+        far = error[rows] > tolerance
+        rows, gap, jacobian = rows[far], gap[far], jacobian[far]
+        if not rows.size:
             break
         if inverse_weight is None:
             inverse = pseudoinverse(jacobian)
         else:
-            inverse = weighted_pseudoinverse(jacobian, inverse_weight)
-        step = np.einsum("knm,km->kn", inverse, gap)
+            inverse = weighted_pseudoinverse(jacobian, inverse_weight[rows])
+        step = (inverse @ gap[:, :, None])[:, :, 0]
         # Near a singular configuration a Newton step can be arbitrarily long; half a radian is far on any arm.
-        size = np.linalg.norm(step, axis=1, keepdims=True)
-        q += step * np.minimum(1.0, 0.5 / np.maximum(size, 1e-300))
+        size = np.sqrt((step * step).sum(axis=1, keepdims=True))
+        q[rows] += step * np.minimum(1.0, 0.5 / np.maximum(size, 1e-300))
+    else:
+        error[rows] = np.linalg.norm(x_ref[rows] - task.value(q[rows]), axis=1)
     return q, error
 
 

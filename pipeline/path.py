@@ -161,6 +161,8 @@ def read_waypoints(file: str | File, axes: Sequence[str]) -> Array:
         table = pd.read_csv(file, skipinitialspace=True, comment="#")
     except (ValueError, OSError) as error:
         raise PathError(f"path.file = {file}: not a CSV table ({str(error).splitlines()[0]})") from None
+    if not isinstance(table.index, pd.RangeIndex):
+        raise PathError(f"path.file = {file}: the rows of the data hold more values than the header has columns")
     missing = [axis for axis in axes if axis not in table.columns]
     if missing:
         raise PathError(

@@ -48,6 +48,13 @@ class Limits:
     torque: Array
     power: Array
 
+    @property
+    def any(self) -> bool:
+        """Whether there is a limit at all."""
+        return any(
+            np.isfinite(bound).any() for bound in (self.lower, self.upper, self.velocity, self.torque, self.power)
+        )
+
     @classmethod
     def none(cls, n: int) -> Limits:
         free = np.full(n, np.inf)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import platform
+import shutil
 import sys
 import time
 from collections.abc import Callable
@@ -15,9 +16,10 @@ from pipeline import config as schema
 from pipeline.arm import Arm
 from pipeline.arrays import Array
 from pipeline.errors import ConfigError, PathError, RobotError
-from pipeline.evaluate import Evaluation, evaluate
+from pipeline.evaluation import evaluate
 from pipeline.kinematics import place, project
 from pipeline.methods import global_planner, lsv, pmke
+from pipeline.parallel import Workers
 from pipeline.path import (
     ConstantSpeed,
     Geometry,
@@ -31,10 +33,11 @@ from pipeline.path import (
     direction_vector,
     read_waypoints,
 )
-from pipeline.problem import Problem, Progress, Solution
+from pipeline.problem import Boundary, Limits, Objective, Problem, Progress, Solution
 from pipeline.task import PositionTask
 
 PROJECT = File(__file__).resolve().parent.parent
+UNFINISHED = ".unfinished"  # finished solves of a run that is not finished: what a resumed run starts from
 TIMINGS: dict[str, Callable[[float], Timing]] = {
     "raised_cosine": RaisedCosine,
     "constant_speed": ConstantSpeed,
@@ -55,19 +58,29 @@ def prepare(config: schema.RunConfig) -> Problem:
     q_init = np.array(robot.q_init)
     geometry, q_init = _geometry(config.path, task, q_init)
     reference = Reference(geometry, TIMINGS[config.timing.law](config.timing.duration))
-    times = np.linspace(0.0, config.timing.duration, config.timing.steps + 1)
-    problem = Problem(task, reference, q_init, times)
+    problem = Problem(
+        task,
+        reference,
+        q_init,
+        _knots(config.timing),
+        objective=Objective(config.objective.kinetic_energy, config.objective.torque),
+        limits=_limits(config.limits, arm),
+        boundary=Boundary(config.boundary.kind),
+    )
+    _check(problem)
     _require_reach(problem)
     return problem
 
 
-def solve(problem: Problem, config: schema.RunConfig, progress: Progress) -> list[tuple[list[Solution], float]]:
+def solve(
+    problem: Problem, config: schema.RunConfig, workers: Workers, progress: Progress
+) -> list[tuple[list[Solution], float]]:
     """The solutions of each method asked for, in order, with the method's wall time [s]."""
     options = config.method
     methods: dict[str, Callable[[], list[Solution]]] = {
         "lsv": lambda: [lsv.solve(problem, options.lsv)],
         "pmke": lambda: [pmke.solve(problem, options.pmke)],
-        "global": lambda: global_planner.solve(problem, options.global_, config.seed, progress),
+        "global": lambda: global_planner.solve(problem, options.global_, config.seed, workers, progress),
     }
     results = []
     for method in config.methods:
@@ -94,7 +107,7 @@ def run_and_write(config: schema.RunConfig, folder: File) -> int:
 
     begin = time.perf_counter()
     with console.progress(config.name) as progress:
-        results = solve(problem, config, progress)
+        results = solve(problem, config, Workers(config.parallel.workers, folder / UNFINISHED), progress)
     timed("solve", begin)
 
     begin = time.perf_counter()
@@ -117,6 +130,7 @@ def run_and_write(config: schema.RunConfig, folder: File) -> int:
     )
     timed("recording", begin)
     tables.write_run(folder, config, facts, results, evaluations, stages)
+    shutil.rmtree(folder / UNFINISHED, ignore_errors=True)
     console.report(summary, folder)
     return 0 if all(evaluation.confirmed for evaluation in evaluations) else 1
 
@@ -134,6 +148,67 @@ def versions() -> dict[str, str]:
     packages = ("selfmotion", "drake", "numpy", "scipy", "pandas", "rerun-sdk", "hydra-core", "matplotlib")
     machine = f"{platform.system()} {platform.machine()}"
     return {"python": sys.version.split()[0], "machine": machine, **{package: of(package) for package in packages}}
+
+
+def _knots(timing: schema.TimingConfig) -> Array:
+    """The grid (steps + 1,) [s]: even, or finer by the factors of `dense`."""
+    if not timing.dense:
+        return np.linspace(0.0, timing.duration, timing.steps + 1)
+    fine = np.linspace(0.0, timing.duration, 20 * timing.steps + 1)
+    density = np.ones(len(fine) - 1)
+    middle = (fine[1:] + fine[:-1]) / 2
+    for start, end, factor in timing.dense:
+        density = np.where((middle >= start) & (middle <= end), density * factor, density)
+    share = np.concatenate([[0.0], np.cumsum(density)])
+    return np.interp(np.linspace(0.0, share[-1], timing.steps + 1), share, fine)
+
+
+def _limits(limits: schema.LimitsConfig, arm: Arm) -> Limits:
+    """The description's limits as far as `kind` takes them, overridden by the values given."""
+    description, free = arm.description, np.full(arm.n, np.inf)
+    joint, all_of_them = limits.kind != "none", limits.kind == "joint_torque_power"
+
+    def bound(key: str, own: Array) -> Array:
+        given = getattr(limits, key)
+        if given is None:
+            return own
+        if isinstance(given, list) and len(given) != arm.n:
+            raise ConfigError(f"limits.{key} has {len(given)} values, the arm has {arm.n} moving joints")
+        return np.broadcast_to(np.asarray(given, dtype=float), arm.n).copy()
+
+    return Limits(
+        lower=bound("lower", description.lower if joint else -free),
+        upper=bound("upper", description.upper if joint else free),
+        velocity=bound("velocity", description.velocity if joint else free),
+        torque=bound("torque", description.effort if all_of_them else free),
+        power=bound("power", free),
+    )
+
+
+def _check(problem: Problem) -> None:
+    """Refuse what no motion can meet: contradicting limits, a fixed start outside them, an open path for a cycle."""
+    limits, names = problem.bounds, problem.task.arm.description.joints
+    for joint in np.flatnonzero(limits.lower >= limits.upper):
+        raise ConfigError(
+            f"limits.lower of {names[joint]} ({limits.lower[joint]:.4g}) is not below limits.upper ({limits.upper[joint]:.4g})"
+        )
+    weights = problem.objective.kinetic_energy + problem.objective.torque
+    if abs(weights - 1.0) > 1e-9:
+        raise ConfigError(f"objective.kinetic_energy + objective.torque = {weights:g}: the weights must add up to 1")
+    if problem.boundary is Boundary.FIXED:
+        outside = np.flatnonzero((problem.q_init < limits.lower) | (problem.q_init > limits.upper))
+        for joint in outside:
+            raise ConfigError(
+                f"robot.q_init of {names[joint]} is {problem.q_init[joint]:.4g}, outside its limits "
+                f"{limits.lower[joint]:.4g} to {limits.upper[joint]:.4g}, and boundary = fixed starts there"
+            )
+    if problem.boundary is Boundary.CYCLIC:
+        ends = problem.reference.position(np.array([0.0, problem.reference.duration]))
+        gap = float(np.linalg.norm(ends[1] - ends[0]))
+        if gap > 1e-9:
+            raise PathError(
+                f"boundary = cyclic: the path ends {gap:.3g} m from where it starts; a cycle needs a closed path"
+            )
 
 
 def _find(urdf: str) -> File:

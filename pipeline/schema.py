@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import dataclasses
 import difflib
-import math
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeVar
 
@@ -37,7 +37,7 @@ def _check_number(whole: bool, low: float | None, high: float | None, above: flo
     allowed = f"must be {kind}" + (" " + " and ".join(bounds) if bounds else "") + (f" {unit}" if unit else "")
 
     def check(value: Any, key: str) -> Any:
-        ok = isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+        ok = isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= sys.float_info.max
         if ok and whole:
             ok = float(value).is_integer()
         if (
@@ -130,6 +130,34 @@ def numbers(default: Sequence[float] | None, *, length: int | None = None, unit:
     return _field(None if default is None else list(default), _optional(default, check))
 
 
+def per_joint(*, above: float | None = None, unit: str = "") -> Any:
+    """None, one number for all joints, or a list with one number per joint."""
+    one = _check_number(False, None, None, above, unit)
+
+    def check(value: Any, key: str) -> float | list[float]:
+        if isinstance(value, list | tuple):
+            return [one(entry, f"{key}[{i}]") for i, entry in enumerate(value)]
+        return float(one(value, key))
+
+    return _field(None, _optional(None, check))
+
+
+def intervals() -> Any:
+    """A list of [from s, to s, factor]: where a grid is denser, and how many times."""
+
+    def check(value: Any, key: str) -> list[list[float]]:
+        rows = numbers([])
+        if not isinstance(value, list | tuple):
+            raise _fail(key, value, "must be a list of [from s, to s, factor]")
+        made = [rows.metadata["check"](row, f"{key}[{i}]") for i, row in enumerate(value)]
+        for row in made:
+            if len(row) != 3 or not 0 <= row[0] < row[1] or not row[2] > 0:
+                raise _fail(key, row, "must be [from s, to s, factor] with 0 <= from < to and factor > 0")
+        return made
+
+    return _field([], check)
+
+
 def angle_or_vector(default: float | None) -> Any:
     """An angle [deg] in the task plane, or a direction vector of 2 or 3 numbers."""
 
@@ -137,9 +165,10 @@ def angle_or_vector(default: float | None) -> Any:
         one = _check_number(False, None, None, None, "")
         if isinstance(value, list | tuple):
             return [one(entry, f"{key}[{i}]") for i, entry in enumerate(value)]
-        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-            raise _fail(key, value, "must be an angle in degrees or a list of numbers")
-        return float(value)
+        try:
+            return float(one(value, key))
+        except ConfigError:
+            raise _fail(key, value, "must be an angle in degrees or a list of numbers") from None
 
     return _field(default, check)
 
@@ -204,7 +233,7 @@ def build(cls: type[T], values: Any, where: str = "") -> T:
 
 def _build_kind(kinds: Mapping[str, type], value: Any, where: str) -> Any:
     kind = value.get("kind") if isinstance(value, Mapping) else None
-    if kind not in kinds:
+    if not isinstance(kind, str) or kind not in kinds:
         raise _fail(f"{where}.kind", kind, f"allowed: {', '.join(kinds)}")
     return build(kinds[str(kind)], {key: entry for key, entry in value.items() if key != "kind"}, where)
 

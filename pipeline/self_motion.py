@@ -18,7 +18,6 @@ from scipy.stats import qmc
 
 from pipeline.arrays import Array
 from pipeline.errors import InputError, PathError
-from pipeline.kinematics import project, pseudoinverse
 from pipeline.task import PositionTask
 
 CLOSED = 1e-11  # [m] how well a node holds its task point
@@ -26,6 +25,8 @@ LONGEST_STEP = 0.3  # [rad] of the tracing; the Hermite curve through its points
 SMALLEST_STEP = 1e-6  # [rad] below: the task point is a critical value of the kinematics to machine precision
 NEAR = 0.05  # [rad] a seed this close to a traced loop, running the same way, lies on it
 MOST_STEPS = 4000
+NUDGE = 1e-9  # [m] from a critical task point to one with a regular manifold
+KINDS = ("normal", "latin_hypercube", "uniform")
 
 
 @dataclass(frozen=True)
@@ -98,14 +99,56 @@ def manifolds(
             f"the self-motion manifold is a curve for redundancy degree 1 only; this task has r = {task.redundancy}"
         )
     traced = _all_loops(task, x, _seeds(task, x, rng, seeds, random_seeds))
-    for i, loops in enumerate(traced):
-        if not loops:
-            raise PathError(
-                f"point {i + 1} of {len(x)} of the path ({', '.join(f'{v:.4g}' for v in x[i])}) m is out of the arm's reach"
-            )
+    for i in [i for i, loops in enumerate(traced) if not loops]:
+        # At a critical value of the kinematics loops meet or shrink to a point: the manifold of a point beside it.
+        for direction in rng.normal(size=(8, task.m)):
+            beside = x[i : i + 1] + NUDGE * direction / np.linalg.norm(direction)
+            traced[i] = traced[i] or _all_loops(task, beside, _seeds(task, beside, rng, seeds, random_seeds))[0]
+        if not traced[i]:
+            point = ", ".join(f"{v:.4g}" for v in x[i])
+            raise PathError(f"point {i + 1} of {len(x)} of the path ({point}) m is out of the arm's reach")
     if spacing is None:
         spacing = max(sum(loop.length for loop in loops) for loops in traced) / (nodes or 180)
     return _resample(task, x, traced, spacing)
+
+
+def on_manifold(task: PositionTask, loop: Loop, s: Array, x: Array) -> Array:
+    """Configurations (P, n) at arc lengths s (P,) of the loop, closed on its task point x (m,)."""
+    return _close(task, loop.interpolate(s), np.broadcast_to(x, (len(s), task.m)), steps=10, tolerance=1e-14)[0]
+
+
+def random_configurations(
+    task: PositionTask, q_init: Array, count: int, rng: np.random.Generator, kind: str = "normal"
+) -> Array:
+    """Distinct configurations (K, n), K <= count, that hold the task point of q_init (n,); q_init comes first. Any r >= 1.
+
+    `normal`, `latin_hypercube`: self-motions q_init + int_0^1 (I - J+J) qd_p dt with random constant qd_p, of standard
+    deviation pi or stratified in (-2 pi, 2 pi) [rad/s] (Global paper eq. (17)); they stay on the component of q_init.
+    `uniform`: random joint angles, projected; they reach every component.
+    """
+    if kind not in KINDS:
+        raise InputError(f"kind of initial configurations = {kind}: allowed are {', '.join(KINDS)}")
+    n, revolute, steps = task.arm.n, task.arm.description.revolute, 40
+    x = np.repeat(task.value(q_init[None]), count, axis=0)
+    kept = wrap_angles(q_init, revolute)[None]
+    for _ in range(5):
+        q = np.repeat(q_init[None], count, axis=0)
+        if kind == "uniform":
+            q = rng.uniform(-np.pi, np.pi, size=(count, n))
+        elif kind == "normal":
+            velocity = rng.normal(scale=np.pi, size=(count, n))
+        else:
+            velocity = 2 * np.pi * (2 * qmc.LatinHypercube(n, rng=rng).random(count) - 1)
+        for _ in range(0 if kind == "uniform" else steps):
+            value, jacobian = task.value_and_jacobian(q)
+            q += velocity / steps + _least(jacobian, x - value - (jacobian @ velocity[:, :, None])[:, :, 0] / steps)
+        q, on = _close(task, q, x, steps=30, tolerance=CLOSED)
+        for candidate in wrap_angles(q[on], revolute):
+            if len(kept) < count and (np.abs(wrap(kept - candidate, revolute)).max(axis=1) > 1e-3).all():
+                kept = np.vstack([kept, candidate])
+        if len(kept) == count:
+            break
+    return kept
 
 
 # --- finding every loop ---------------------------------------------------------------------------------------------

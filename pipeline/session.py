@@ -17,7 +17,7 @@ exit_code = 0  # of the process: 0 all confirmed, 1 a method failed, 2 bad input
 
 def checked(values: DictConfig) -> schema.RunConfig:
     """The typed configuration of a composed one; raises ConfigError."""
-    own = OmegaConf.masked_copy(values, [key for key in values if key != "hydra"])
+    own = OmegaConf.masked_copy(values, [str(key) for key in values if key != "hydra"])
     plain = OmegaConf.to_container(own, resolve=True, throw_on_missing=False)
     assert isinstance(plain, dict)
     return schema.check({str(key): value for key, value in plain.items()})

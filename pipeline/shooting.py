@@ -49,11 +49,11 @@ class Window:
         self._to_velocity: Array = np.sqrt(self._scale / self.dt) * np.linalg.inv(np.linalg.cholesky(mass)).transpose(
             0, 2, 1
         )
-        w: Array = np.linalg.solve(self._to_velocity, velocity[:, :, None]).ravel()
-        w = quasi_newton(self._energy, self._tracking, w, tolerance=0.1 * tolerance)
+        start = np.linalg.solve(self._to_velocity, velocity[:, :, None]).ravel()
+        w = quasi_newton(self._energy, self._tracking, start, tolerance=0.1 * tolerance)
         outcome = ipopt.solve(self.program, w, tolerance=tolerance, **options)
-        q, velocity = self._motion(outcome.x)
-        return q, self.dt * float(self.task.arm.kinetic_energy(q, velocity).sum()), outcome, self._rows.iterations
+        q, qd = self._motion(outcome.x)
+        return q, self.dt * float(self.task.arm.kinetic_energy(q, qd).sum()), outcome, self._rows.iterations
 
     def _motion(self, w: Array) -> tuple[Array, Array]:
         velocity = (self._to_velocity @ w.reshape(self.horizon, self.n, 1))[:, :, 0]

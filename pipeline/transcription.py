@@ -1,13 +1,16 @@
-"""Problem -> lifted MathematicalProgram, and back to a Trajectory. The only place where its scaling lives.
+"""Problem -> lifted MathematicalProgram, and back to joint positions. The only place where its scaling lives.
 
-Unknowns are the positions at all knots and, for every interval, the velocity whitened by the mass matrix of the guess:
+Every quantity that is penalised or limited is an unknown of its own, tied to the others by equality constraints:
 
-    y_i = POSITION_SCALE q_i,   w_i = sqrt(dt_i / E) L_i' qd_i,   qd_i = (q_i - q_(i-1)) / dt_i,   M(q_guess,i) = L_i L_i'.
+    y_i = POSITION_SCALE q_i                                          at all knots,
+    w_i = S_i qd_i,     qd_i = (q_i - q_(i-1)) / dt_i                 for every interval (linear),
+    u_i = s_i tau_i,    tau_i = M(q_i) qdd_i + n(q_i, qd_i)           only if torques or powers count,
 
-The kinetic-energy integral sum_i 1/2 qd_i' M(q_i) qd_i dt_i (PMKE paper eq. (4), Global paper eq. (5); backward
-differences), divided by its value E at the guess, then has nearly the identity for a Hessian in w: what IPOPT's
-limited-memory approximation starts from. The links between q and w are linear, and positions that are scaled small do
-not weigh in that start. With E of the guess divided out, the number of iterations does not depend on POSITION_SCALE.
+with backward differences throughout: qdd_i = (qd_i - qd_(i-1)) / dt_i (PMKE paper eq. (4), Global paper eqs (3)-(6)).
+For the kinetic energy, S_i = sqrt(dt_i / C) L_i' with M(q_guess,i) = L_i L_i' and C the cost of the guess: divided by
+C, the objective then has nearly the identity for a Hessian in w, which is what IPOPT's limited-memory approximation
+starts from. The squared torques are a plain |u|^2. Positions scaled small do not weigh in that start. Position and
+torque limits are bounds; velocity limits are bounds or linear rows; power limits are bilinear rows.
 """
 
 from __future__ import annotations
@@ -17,99 +20,205 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
-from pydrake.solvers import MathematicalProgram
+from pydrake.solvers import LinearConstraint, MathematicalProgram, QuadraticConstraint
 
 from pipeline import ipopt
 from pipeline.arrays import Array
+from pipeline.costs import Costs, integrals, velocities
 from pipeline.differentiable import DifferentiableConstraint, DifferentiableCost
 from pipeline.problem import Boundary, Problem
 
 POSITION_SCALE = 0.01
+VELOCITY_SCALE = 0.01  # for objectives without kinetic energy: small, like the positions
 KNOTS_PER_BINDING = 10  # a Python binding pays for its size squared: more, smaller bindings are cheaper up to a point
+Block = NDArray[np.int_]
 
 
 class Transcription:
-    """The program of `problem` on the knots `times` (N + 1,), scaled for a solve that starts at `guess` (N + 1, n)."""
+    """The program of `problem` on the knots `times` (N + 1,), scaled for a solve that starts at `guess` (N + 1, n).
 
-    def __init__(self, problem: Problem, times: Array, guess: Array) -> None:
+    elastic: every limit may be exceeded by the same fraction, and that fraction is what is minimised instead.
+    """
+
+    def __init__(self, problem: Problem, times: Array, guess: Array, *, elastic: bool = False) -> None:
+        self.elastic = elastic
         self.problem, self.times, self.q_guess = problem, times, guess
-        self.arm = problem.task.arm
+        self.arm, self.objective, self.limits = problem.task.arm, problem.objective, problem.bounds
         self.n, self.intervals = self.arm.n, len(times) - 1
         self.dt = np.diff(times)
         self.x_ref = problem.reference.position(times)
+        self.lifts_torque = self.objective.torque > 0 or bool(
+            np.isfinite(self.limits.torque).any() or np.isfinite(self.limits.power).any()
+        )
         self._tracking_rows: list[DifferentiableConstraint] = []
-
-        velocity = np.diff(guess, axis=0) / self.dt[:, None]
-        mass = self.arm.mass_matrix(guess[1:])
-        energy = 0.5 * float(np.einsum("ki,kij,kj->k", velocity, mass, velocity) @ self.dt)
-        self.energy = energy if energy > 0 else 1.0
-        factor = np.sqrt(self.energy / self.dt)[:, None, None]
-        self.to_velocity = factor * np.linalg.inv(np.linalg.cholesky(mass)).transpose(
-            0, 2, 1
-        )  # qd_i = to_velocity_i w_i
+        self._scale()
 
         self.program = MathematicalProgram()
-        split = (self.intervals + 1) * self.n
-        unknowns = self.program.NewContinuousVariables(split + self.intervals * self.n, "x")
-        self.y = unknowns[:split].reshape(-1, self.n)
-        self.w = unknowns[split:].reshape(-1, self.n)
+        positions, rates = (self.intervals + 1) * self.n, self.intervals * self.n
+        count = positions + rates * (2 if self.lifts_torque else 1)
+        unknowns = self.program.NewContinuousVariables(count, "x")
+        self.y = unknowns[:positions].reshape(-1, self.n)
+        self.w = unknowns[positions : positions + rates].reshape(-1, self.n)
+        self.u = unknowns[positions + rates :].reshape(-1, self.n)
+
+        if elastic:
+            self.excess = self.program.NewContinuousVariables(1, "excess")
+            self.program.AddBoundingBoxConstraint(0.0, np.inf, self.excess)
+            self.program.AddLinearCost(np.ones(1), self.excess)
         self._link()
-        self._bound()
-        for first in range(0, self.intervals, KNOTS_PER_BINDING):
-            block = np.arange(first, min(first + KNOTS_PER_BINDING, self.intervals))
-            self._add_kinetic_energy(block)
-            self._add_tracking(block + 1)
+        self._bound_ends()
+        self._limit()
+        closed = problem.boundary is Boundary.CYCLIC
+        first_free = 1 if problem.boundary is Boundary.FIXED else 0
+        for block in _blocks(first_free, self.intervals + (0 if closed else 1)):
+            self._add_tracking(block)
+        for block in _blocks(0, self.intervals):
+            if self.objective.kinetic_energy > 0 and not elastic:
+                self._add_kinetic_energy(block)
+            if self.lifts_torque:
+                self._add_torque(block)
+        if self.objective.torque > 0 and not elastic:
+            flat = self.u.ravel()
+            self.program.AddQuadraticCost(2 * np.eye(len(flat)), np.zeros(len(flat)), flat, is_convex=True)
 
     def solve(self, **options: Any) -> tuple[Array, ipopt.Outcome, int]:
         """Solve from the guess: positions (N + 1, n) [rad], IPOPT's outcome, its iterations."""
-        velocity = np.diff(self.q_guess, axis=0) / self.dt[:, None]
-        w = np.linalg.solve(self.to_velocity, velocity[:, :, None])
-        outcome = ipopt.solve(
-            self.program, np.concatenate([POSITION_SCALE * self.q_guess.ravel(), w.ravel()]), **options
-        )
+        for rows in self._tracking_rows:
+            rows.forget()
+        parts = [POSITION_SCALE * self.q_guess, self._to_w(self.qd_guess)]
+        if self.lifts_torque:
+            parts.append(self.torque_scale[:, None] * self.tau_guess)
+        if self.elastic:
+            parts.append(np.ones(1))
+        outcome = ipopt.solve(self.program, np.concatenate([part.ravel() for part in parts]), **options)
         q = outcome.x[: self.y.size].reshape(self.y.shape) / POSITION_SCALE
         return q, outcome, self._tracking_rows[0].iterations
+
+    # --- scaling ------------------------------------------------------------------------------------------------
+
+    def _scale(self) -> None:
+        """Choose S_i and s_i from the guess, so that the objective there is 1."""
+        q, dt = self.q_guess, self.dt
+        qd = velocities(self.problem, self.times, q)
+        self.qd_guess = qd[1:]
+        costs: Costs = integrals(self.problem, self.times, q)
+        self.tau_guess = costs.tau[1:]
+        weighted = self.objective.kinetic_energy * costs.kinetic_energy + self.objective.torque * costs.torque
+        self.cost = weighted if weighted > 0 else 1.0
+        if self.objective.kinetic_energy > 0:
+            root = np.linalg.cholesky(self.arm.mass_matrix(q[1:]))
+            factor = np.sqrt(self.cost / self.objective.kinetic_energy / dt)[:, None, None]
+            self.to_velocity = factor * np.linalg.inv(root).transpose(0, 2, 1)  # qd_i = to_velocity_i w_i
+            self.diagonal = False
+        else:
+            self.to_velocity = np.tile(np.eye(self.n) / VELOCITY_SCALE, (self.intervals, 1, 1))
+            self.diagonal = True
+        if self.objective.torque > 0:
+            self.torque_scale = np.sqrt(self.objective.torque * dt / self.cost)
+        else:
+            size = float(np.sqrt(np.mean(self.tau_guess**2))) or 1.0
+            self.torque_scale = np.full(self.intervals, 0.1 / (size * np.sqrt(self.intervals)))
+
+    def _to_w(self, qd: Array) -> Array:
+        return np.linalg.solve(self.to_velocity, qd[:, :, None])[:, :, 0]
 
     # --- rows that Drake handles natively -----------------------------------------------------------------------
 
     def _link(self) -> None:
         """y_i - y_(i-1) = POSITION_SCALE dt_i qd_i, as one sparse linear binding."""
         count, n = self.intervals, self.n
-        difference = sp.kron(
-            sp.diags_array([-np.ones(count), np.ones(count)], offsets=[0, 1], shape=(count, count + 1)), sp.eye_array(n)
-        )
-        step = sp.block_diag(list(POSITION_SCALE * self.dt[:, None, None] * self.to_velocity))
-        rows = sp.csc_matrix(sp.hstack([difference, -step]))
-        self.program.AddLinearEqualityConstraint(
-            rows, np.zeros(count * n), np.concatenate([self.y.ravel(), self.w.ravel()])
+        pairs = sp.diags_array([-np.ones(count), np.ones(count)], offsets=[0, 1], shape=(count, count + 1))
+        steps = sp.block_diag(list(POSITION_SCALE * self.dt[:, None, None] * self.to_velocity))
+        rows = sp.csc_matrix(sp.hstack([sp.kron(pairs, sp.eye_array(n)), -steps]))
+        rows.eliminate_zeros()
+        unknowns = np.concatenate([self.y.ravel(), self.w.ravel()])
+        self.program.AddLinearEqualityConstraint(rows, np.zeros(count * n), unknowns)
+
+    def _bound_ends(self) -> None:
+        if self.problem.boundary is Boundary.FIXED:
+            start = POSITION_SCALE * self.problem.q_init
+            self.program.AddBoundingBoxConstraint(start, start, self.y[0])
+        if self.problem.boundary is Boundary.CYCLIC:
+            closing = np.hstack([np.eye(self.n), -np.eye(self.n)])
+            ends = np.concatenate([self.y[0], self.y[-1]])
+            self.program.AddLinearEqualityConstraint(closing, np.zeros(self.n), ends)
+
+    def _limit(self) -> None:
+        limits, count = self.limits, self.intervals
+        first = 1 if self.problem.boundary is Boundary.FIXED else 0
+        if np.isfinite(limits.lower).any() or np.isfinite(limits.upper).any():
+            low, high = (np.tile(POSITION_SCALE * bound, count + 1 - first) for bound in (limits.lower, limits.upper))
+            self._keep_within(low, high, self.y[first:].ravel(), (high - low) / 2)
+        if np.isfinite(limits.velocity).any():
+            # Scaled so that a row's coefficients are of order one.
+            size = np.abs(self.to_velocity).max(axis=(1, 2))
+            bound = (limits.velocity / size[:, None]).ravel()
+            rows = None if self.diagonal else sp.block_diag(list(self.to_velocity / size[:, None, None]))
+            self._keep_within(-bound, bound, self.w.ravel(), bound, rows)
+        if np.isfinite(limits.torque).any():
+            bound = (limits.torque * self.torque_scale[:, None]).ravel()
+            self._keep_within(-bound, bound, self.u.ravel(), bound)
+        for joint in np.flatnonzero(np.isfinite(limits.power)):
+            self._limit_power(int(joint), float(limits.power[joint]))
+
+    def _keep_within(self, low: Array, high: Array, unknowns: Any, slack: Array, rows: Any = None) -> None:
+        """low <= rows @ unknowns <= high; as bounds where it can be, and softened by excess * slack if elastic."""
+        if not self.elastic:
+            if rows is None:
+                self.program.AddBoundingBoxConstraint(low, high, unknowns)
+            else:
+                self.program.AddConstraint(LinearConstraint(sp.csc_matrix(rows), low, high), unknowns)
+            return
+        rows = sp.eye_array(len(unknowns)) if rows is None else rows
+        # A joint with a limit on one side only gives way by a radian per unit of excess.
+        give = sp.csc_matrix(np.where(np.isfinite(slack), slack, POSITION_SCALE)[:, None])
+        both = sp.csc_matrix(sp.vstack([sp.hstack([rows, -give]), sp.hstack([-sp.csc_matrix(rows), -give])]))
+        above = np.concatenate([high, -low])
+        used = np.flatnonzero(np.isfinite(above))
+        free = np.full(len(used), -np.inf)
+        self.program.AddConstraint(
+            LinearConstraint(both[used], free, above[used]), np.concatenate([unknowns, self.excess])
         )
 
-    def _bound(self) -> None:
-        if self.problem.boundary is not Boundary.FIXED:
-            raise ValueError("this transcription serves a fixed initial configuration")
-        start = POSITION_SCALE * self.problem.q_init
-        self.program.AddBoundingBoxConstraint(start, start, self.y[0])
+    def _limit_power(self, joint: int, power: float) -> None:
+        """|tau_j qd_j| <= P for one joint at all intervals: u_ij (to_velocity_i w_i)_j s_i^-1, relative to P."""
+        for i in range(self.intervals):
+            row = self.to_velocity[i, joint]
+            used = np.flatnonzero(row)
+            form = np.zeros((len(used) + 1, len(used) + 1))
+            form[0, 1:] = form[1:, 0] = row[used] / (self.torque_scale[i] * power)
+            unknowns = np.concatenate([[self.u[i, joint]], self.w[i, used]])
+            indefinite = QuadraticConstraint.HessianType.kIndefinite
+            if not self.elastic:
+                constraint = QuadraticConstraint(form, np.zeros(len(form)), -1.0, 1.0, indefinite)
+                self.program.AddConstraint(constraint, unknowns)
+                continue
+            form = np.pad(form, (0, 1))
+            linear = np.append(np.zeros(len(used) + 1), -1.0)
+            for sign in (1.0, -1.0):
+                constraint = QuadraticConstraint(sign * form, linear, -np.inf, 1.0, indefinite)
+                self.program.AddConstraint(constraint, np.concatenate([unknowns, self.excess]))
 
     # --- nonlinear terms, KNOTS_PER_BINDING knots each ----------------------------------------------------------
 
-    def _add_kinetic_energy(self, block: NDArray[np.int_]) -> None:
-        shape, dt, to_velocity = (len(block), self.n), self.dt[block], self.to_velocity[block]
+    def _add_kinetic_energy(self, block: Block) -> None:
+        shape, to_velocity = (len(block), self.n), self.to_velocity[block]
+        weight = self.objective.kinetic_energy * self.dt[block] / self.cost
         split = len(block) * self.n
 
         def energy(x: Array) -> tuple[float, Array]:
             q = x[:split].reshape(shape) / POSITION_SCALE
-            velocity = np.einsum("kij,kj->ki", to_velocity, x[split:].reshape(shape))
+            velocity = (to_velocity @ x[split:].reshape(*shape, 1))[:, :, 0]
             value, by_q, by_velocity = self.arm.kinetic_energy_gradient(q, velocity)
-            weight = dt / self.energy
             by_y = by_q * weight[:, None] / POSITION_SCALE
-            by_w = np.einsum("kij,ki->kj", to_velocity, by_velocity) * weight[:, None]
+            by_w = (by_velocity[:, None, :] @ to_velocity)[:, 0] * weight[:, None]
             return float(value @ weight), np.concatenate([by_y.ravel(), by_w.ravel()])
 
-        self.program.AddCost(
-            DifferentiableCost(energy), vars=np.concatenate([self.y[block + 1].ravel(), self.w[block].ravel()])
-        )
+        unknowns = np.concatenate([self.y[block + 1].ravel(), self.w[block].ravel()])
+        self.program.AddCost(DifferentiableCost(energy), vars=unknowns)
 
-    def _add_tracking(self, knots: NDArray[np.int_]) -> None:
+    def _add_tracking(self, knots: Block) -> None:
+        """x(q_i) = x_ref,i."""
         task, count, n, m = self.problem.task, len(knots), self.n, self.problem.task.m
         diagonal = np.arange(count)
 
@@ -119,9 +228,66 @@ class Transcription:
             rows[diagonal, :, diagonal] = jacobian / POSITION_SCALE
             return value.ravel(), rows.reshape(count * m, count * n)
 
-        rows = DifferentiableConstraint(position)
-        target = self.x_ref[knots].ravel()
-        binding = self.program.AddConstraint(rows, lb=target, ub=target, vars=self.y[knots].ravel())
         pattern = [(k * m + i, k * n + j) for k in range(count) for i in range(m) for j in range(n)]
+        target = self.x_ref[knots].ravel()
+        self._tracking_rows.append(self._add_rows(position, target, self.y[knots].ravel(), pattern))
+
+    def _add_torque(self, block: Block) -> None:
+        """u_i = s_i (M(q_i) qdd_i + n(q_i, qd_i)), with qd_(i-1) from the interval before."""
+        count, n = len(block), self.n
+        before = self._before(block[0])
+        has_before = before is not None
+        own = count + (1 if has_before else 0)
+        step, scale, to_velocity = self.dt[block], self.torque_scale[block], self.to_velocity[block]
+        intervals = block if before is None else np.concatenate([[before], block])
+        rate = self.to_velocity[intervals]
+        at_speed = not has_before and not self.problem.reference.timing.at_rest
+        diagonal = np.arange(count)
+        offset = 1 if has_before else 0
+        split_y, split_w = count * n, count * n + own * n
+
+        def torque(x: Array) -> tuple[Array, Array]:
+            q = x[:split_y].reshape(count, n) / POSITION_SCALE
+            all_qd = (rate @ x[split_y:split_w].reshape(own, n, 1))[:, :, 0]
+            qd = all_qd[offset:]
+            first = all_qd[:1] if has_before else qd[:1] if at_speed else np.zeros((1, n))
+            previous = np.vstack([first, qd[:-1]])
+            tau, by_q, by_qd, by_qdd = self.arm.inverse_dynamics_gradient(q, qd, (qd - previous) / step[:, None])
+            by_qdd = by_qdd / step[:, None, None]
+            rows = np.zeros((count, n, x.size // n, n))
+            factor = scale[:, None, None]
+            rows[diagonal, :, diagonal] = -factor * by_q / POSITION_SCALE
+            rows[diagonal, :, count + offset + diagonal] = -factor * (by_qd + by_qdd) @ to_velocity
+            if at_speed:
+                rows[0, :, count] = -factor[0] * by_qd[0] @ to_velocity[0]
+            late = diagonal if has_before else diagonal[1:]
+            earlier = count + offset - 1 + late
+            rows[late, :, earlier] += factor[late] * by_qdd[late] @ rate[offset - 1 + late]
+            rows[diagonal, :, count + own + diagonal] = np.eye(n)
+            value = x[split_w:].reshape(count, n) - scale[:, None] * tau
+            return value.ravel(), rows.reshape(count * n, x.size)
+
+        unknowns = np.concatenate([self.y[block + 1].ravel(), self.w[intervals].ravel(), self.u[block].ravel()])
+        pattern = []
+        for k in range(count):
+            columns = {k, count + offset + k, *([count + offset + k - 1] if k or has_before else [])}
+            for i in range(n):
+                pattern += [(k * n + i, c * n + j) for c in sorted(columns) for j in range(n)]
+                pattern.append((k * n + i, (count + own + k) * n + i))
+        self._add_rows(torque, np.zeros(count * n), unknowns, pattern)
+
+    def _before(self, interval: int) -> int | None:
+        """The interval whose velocity precedes this one's; None where the motion begins."""
+        if interval > 0:
+            return interval - 1
+        return self.intervals - 1 if self.problem.boundary is Boundary.CYCLIC else None
+
+    def _add_rows(self, function: Any, target: Array, unknowns: Any, pattern: list[tuple[int, int]]) -> Any:
+        rows = DifferentiableConstraint(function)
+        binding = self.program.AddConstraint(rows, lb=target, ub=target, vars=unknowns)
         binding.evaluator().SetGradientSparsityPattern(pattern)
-        self._tracking_rows.append(rows)
+        return rows
+
+
+def _blocks(first: int, end: int) -> list[Block]:
+    return [np.arange(start, min(start + KNOTS_PER_BINDING, end)) for start in range(first, end, KNOTS_PER_BINDING)]

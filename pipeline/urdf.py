@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from pipeline.arrays import Array
 from pipeline.errors import RobotError
 
 MOVING = ("revolute", "continuous", "prismatic")
@@ -38,10 +39,10 @@ class Description:
     end_effector: str
     joints: tuple[str, ...]
     revolute: NDArray[np.bool_]
-    lower: NDArray[np.float64]
-    upper: NDArray[np.float64]
-    velocity: NDArray[np.float64]
-    effort: NDArray[np.float64]
+    lower: Array
+    upper: Array
+    velocity: Array
+    effort: Array
 
 
 def read(
@@ -58,8 +59,8 @@ def read(
     if root.tag != "robot":
         raise RobotError(f"robot.urdf = {file}: the root element is <{root.tag}>, expected <robot>")
 
-    links = {_name(link, file): link for link in root.findall("link")}
-    joints = {_name(joint, file): joint for joint in root.findall("joint")}
+    links = _by_name(root, "link", file)
+    joints = _by_name(root, "joint", file)
     parent_joint: dict[str, ET.Element] = {}
     for name, joint in joints.items():
         for end in ("parent", "child"):
@@ -67,7 +68,14 @@ def read(
                 raise RobotError(
                     f"robot.urdf = {file}: joint '{name}' has the {end} '{_end(joint, end)}', which is no link of the file"
                 )
-        parent_joint[_end(joint, "child")] = joint
+        child = _end(joint, "child")
+        if child in parent_joint:
+            raise RobotError(
+                f"robot.urdf = {file}: link '{child}' is the child of two joints, '{parent_joint[child].get('name')}' and '{name}'"
+            )
+        parent_joint[child] = joint
+        for place, key in (("origin", "xyz"), ("origin", "rpy"), ("axis", "xyz")):
+            _vector(joint, place, key, file)
     roots = [link for link in links if link not in parent_joint]
     if len(roots) != 1:
         raise RobotError(
@@ -92,12 +100,15 @@ def read(
                     f"robot.urdf = {file}: joint '{name}' in the chain mimics another joint; lock it (robot.locked.{name}=0)"
                 )
         elif kind != "fixed":
-            _freeze(joint, float((locked or {}).get(name, 0.0)))
+            _freeze(joint, float((locked or {}).get(name, 0.0)), file)
     moving = [joint for joint in chain if joint.get("type") in MOVING]
     if not moving:
         raise RobotError(f"robot.urdf = {file}: no moving joint between '{base or roots[0]}' and '{end_effector}'")
     _check_inertia(links, moving, joints, file)
-    _strip(root)
+    revolute = np.array([joint.get("type") != "prismatic" for joint in moving])
+    lower, upper = (_limits(moving, key, absent, file) for key, absent in (("lower", -np.inf), ("upper", np.inf)))
+    velocity, effort = (_limits(moving, key, np.inf, file) for key in ("velocity", "effort"))
+    _strip(root)  # drops the limits too
 
     return Description(
         name=root.get("name", file.stem),
@@ -106,19 +117,49 @@ def read(
         base=roots[0],
         end_effector=end_effector,
         joints=tuple(joint.get("name", "") for joint in moving),
-        revolute=np.array([joint.get("type") != "prismatic" for joint in moving]),
-        lower=np.array([_limit(joint, "lower", -np.inf, file) for joint in moving]),
-        upper=np.array([_limit(joint, "upper", np.inf, file) for joint in moving]),
-        velocity=np.array([_limit(joint, "velocity", np.inf, file) for joint in moving]),
-        effort=np.array([_limit(joint, "effort", np.inf, file) for joint in moving]),
+        revolute=revolute,
+        lower=lower,
+        upper=upper,
+        velocity=velocity,
+        effort=effort,
     )
 
 
-def _name(element: ET.Element, file: Path) -> str:
-    name = element.get("name")
-    if not name:
-        raise RobotError(f"robot.urdf = {file}: a <{element.tag}> has no name")
-    return name
+def _by_name(root: ET.Element, tag: str, file: Path) -> dict[str, ET.Element]:
+    found: dict[str, ET.Element] = {}
+    for element in root.findall(tag):
+        name = element.get("name")
+        if not name:
+            raise RobotError(f"robot.urdf = {file}: a <{tag}> has no name")
+        if name in found:
+            raise RobotError(f"robot.urdf = {file}: two {tag}s are called '{name}'")
+        found[name] = element
+    return found
+
+
+def _number(text: str, what: str, file: Path) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = np.nan
+    if not np.isfinite(value):
+        raise RobotError(f"robot.urdf = {file}: {what} '{text}', expected a number")
+    return value
+
+
+def _vector(joint: ET.Element, place: str, key: str, file: Path) -> Array:
+    """The three numbers of <origin xyz>, <origin rpy> or <axis xyz> (a unit vector), with URDF's defaults."""
+    element = joint.find(place)
+    text = ("1 0 0" if place == "axis" else "0 0 0") if element is None else element.get(key, "0 0 0")
+    what = f"joint '{joint.get('name')}' has in its {place} the {key}"
+    values = np.array([_number(word, what, file) for word in text.split()])
+    size = float(np.linalg.norm(values))
+    if values.shape != (3,) or (place == "axis" and size == 0.0):
+        raise RobotError(
+            f"robot.urdf = {file}: {what} '{text}', expected three numbers"
+            + (" that are not all zero" if place == "axis" else "")
+        )
+    return values / size if place == "axis" else values
 
 
 def _end(joint: ET.Element, end: str) -> str:
@@ -137,47 +178,40 @@ def _chain(base: str, tip: str, parent_joint: Mapping[str, ET.Element], file: Pa
     chain: list[ET.Element] = []
     link = tip
     while link != base:
-        if link not in parent_joint:
+        if link not in parent_joint or parent_joint[link] in chain:
             raise RobotError(f"robot.end_effector = {tip}: not reached from robot.base = {base} in {file.name}")
         chain.insert(0, parent_joint[link])
         link = _end(parent_joint[link], "parent")
     return chain
 
 
-def _limit(joint: ET.Element, which: str, absent: float, file: Path) -> float:
-    limit = joint.find("limit")
-    if (
-        limit is None
-        or (joint.get("type") == "continuous" and which in ("lower", "upper"))
-        or which not in limit.attrib
-    ):
-        return absent
-    try:
-        return float(limit.attrib[which])
-    except ValueError:
-        raise RobotError(
-            f"robot.urdf = {file}: joint '{joint.get('name')}' has the {which} limit '{limit.attrib[which]}', expected a number"
-        ) from None
+def _limits(joints: list[ET.Element], key: str, absent: float, file: Path) -> Array:
+    """One bound of each joint; a continuous joint has no position limits."""
+    values = np.full(len(joints), absent)
+    for index, joint in enumerate(joints):
+        limit = joint.find("limit")
+        unlimited = joint.get("type") == "continuous" and key in ("lower", "upper")
+        if limit is not None and key in limit.attrib and not unlimited:
+            values[index] = _number(limit.attrib[key], f"joint '{joint.get('name')}' has the {key} limit", file)
+    return values
 
 
-def _freeze(joint: ET.Element, position: float) -> None:
+def _freeze(joint: ET.Element, position: float, file: Path) -> None:
     """Make a joint rigid, its position folded into its origin."""
     kind = joint.get("type")
-    origin = joint.find("origin")
-    if origin is None:
-        origin = ET.SubElement(joint, "origin")
     if position != 0.0 and kind in MOVING:
-        axis_element = joint.find("axis")
-        axis = np.array(
-            (axis_element.get("xyz", "1 0 0") if axis_element is not None else "1 0 0").split(), dtype=float
-        )
-        rotation = Rotation.from_euler("xyz", np.array(origin.get("rpy", "0 0 0").split(), dtype=float))
+        axis = _vector(joint, "axis", "xyz", file)
+        rotation = Rotation.from_euler("xyz", _vector(joint, "origin", "rpy", file))
+        origin = joint.find("origin")
+        if origin is None:
+            origin = ET.SubElement(joint, "origin")
         if kind == "prismatic":
-            shift = np.array(origin.get("xyz", "0 0 0").split(), dtype=float) + rotation.apply(axis * position)
+            shift = _vector(joint, "origin", "xyz", file) + rotation.apply(axis * position)
             origin.set("xyz", " ".join(map(repr, shift.tolist())))
         else:
-            turned = (rotation * Rotation.from_rotvec(axis * position)).as_euler("xyz")
-            origin.set("rpy", " ".join(map(repr, turned.tolist())))
+            turned = rotation * Rotation.from_rotvec(axis * position)
+            angles = turned.as_euler("xyz", suppress_warnings=True)
+            origin.set("rpy", " ".join(map(repr, angles.tolist())))
     joint.set("type", "fixed")
 
 
@@ -208,24 +242,21 @@ def _check_inertia(
 
 def _mass(link: ET.Element, file: Path) -> float:
     mass = link.find("inertial/mass")
-    if mass is None:
-        return 0.0
-    try:
-        return float(mass.get("value", "0"))
-    except ValueError:
+    value = 0.0 if mass is None else _number(mass.get("value", ""), f"link '{link.get('name')}' has the mass", file)
+    if value < 0.0:
         raise RobotError(
-            f"robot.urdf = {file}: link '{link.get('name')}' has the mass '{mass.get('value')}', expected a number"
-        ) from None
+            f"robot.urdf = {file}: link '{link.get('name')}' has the mass {value:g} kg, expected none or more"
+        )
+    return value
 
 
 def _check_physical(link: ET.Element, name: str, file: Path) -> None:
     inertia = link.find("inertial/inertia")
     if inertia is None:
         return
-    try:
-        xx, yy, zz, xy, xz, yz = (float(inertia.get(key, "0")) for key in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz"))
-    except ValueError:
-        raise RobotError(f"robot.urdf = {file}: link '{name}' has an inertia entry that is not a number") from None
+    keys = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+    entries = (_number(inertia.get(key, "0"), f"link '{name}' has the inertia {key}", file) for key in keys)
+    xx, yy, zz, xy, xz, yz = entries
     a, b, c = np.linalg.eigvalsh(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
     slack = 1e-6 * max(abs(c), 1e-12)
     if a < -slack or a + b < c - slack:

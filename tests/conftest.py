@@ -15,7 +15,7 @@ from hypothesis import settings
 from pipeline import urdf
 from pipeline.arm import Arm
 from pipeline.arrays import Array
-from pipeline.candidates import population
+from pipeline.kinematics import project
 from pipeline.path import Line, RaisedCosine, Reference, circle, direction_vector
 from pipeline.problem import Problem
 from pipeline.task import PositionTask
@@ -76,7 +76,15 @@ def problem(task: PositionTask, reference: Callable[[int], Reference], q_init: A
 @pytest.fixture
 def guess() -> Callable[[Problem], Array]:
     """The inertia-weighted pseudoinverse motion (N + 1, n)."""
-    return lambda problem: population(problem, problem.times, 2, np.random.default_rng(0))[1]
+
+    def motion(problem: Problem) -> Array:
+        rows = [problem.q_init[None]]
+        for point in problem.reference.position(problem.times[1:]):
+            inverse_mass = np.linalg.inv(problem.task.arm.mass_matrix(rows[-1]))
+            rows.append(project(problem.task, rows[-1], point[None], inverse_mass)[0])
+        return np.concatenate(rows)
+
+    return motion
 
 
 @pytest.fixture(scope="session")

@@ -1,6 +1,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,12 +10,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pipeline.arrays import Array
-from pipeline.candidates import distinct, kinetic_energy_integrals, path_distance, population, random_inverse_weights
+from pipeline.candidates import distinct, initial_configurations, path_distance, population, random_inverse_weights
+from pipeline.costs import integrals, objective_values
 from pipeline.path import Line, RaisedCosine, Reference
-from pipeline.problem import Problem
+from pipeline.problem import Objective, Problem
 from pipeline.task import PositionTask
 
 Make = Callable[[int, int], Problem]
+Guess = Callable[[Problem], Array]
 TURNS = np.array([True, True, False])
 
 
@@ -28,51 +32,74 @@ def test_random_weights_are_spd_with_eigenvalues_in_the_unit_interval(rng: np.ra
     np.testing.assert_allclose(np.linalg.inv(inverse).mean(axis=0), 0.5 * np.eye(3), atol=0.03)
 
 
+def motions_of(problem: Problem, count: int, seed: int = 0) -> Array:
+    return population(problem, problem.times, problem.q_init[None], count, np.random.default_rng(seed))
+
+
 @pytest.mark.parametrize("number", [1, 2, 3, 4])
-def test_population_follows_the_path_from_q_init(problem: Make, q_init: Array, number: int) -> None:
+def test_population_follows_the_path_from_its_starts(problem: Make, q_init: Array, number: int) -> None:
     asked = problem(number, 25)
-    motions = population(asked, asked.times, 30, np.random.default_rng(3))
-    assert 5 < len(motions) <= 30
-    assert np.all(motions[:, 0] == q_init)
+    starts = initial_configurations(asked.task, q_init, 4, np.random.default_rng(1))
+    motions = population(asked, asked.times, starts, 40, np.random.default_rng(3))
+    assert 5 < len(motions) <= 40
+    assert all(np.any(np.all(motion[0] == starts, axis=1)) for motion in motions)
     x = asked.task.value(motions.reshape(-1, 3)).reshape(len(motions), 26, 2)
     assert np.linalg.norm(x - asked.reference.position(asked.times), axis=2).max() < 1e-6
-    assert len(distinct(motions, np.zeros(len(motions)), 30, 1e-3, TURNS | True)) > 3
+    assert len(distinct(motions, np.zeros(len(motions)), 40, 1e-3, TURNS | True)) > 3
 
 
 def test_population_is_a_function_of_the_seed(problem: Make) -> None:
     asked = problem(3, 12)
-    first, same, other = (population(asked, asked.times, 10, np.random.default_rng(seed)) for seed in (5, 5, 6))
+    first, same, other = (motions_of(asked, 10, seed) for seed in (5, 5, 6))
     np.testing.assert_array_equal(first, same)
-    np.testing.assert_array_equal(first[:2], other[:2])  # the plain and the inertia-weighted one are not drawn
-    assert not np.array_equal(first[2], other[2])
+    np.testing.assert_allclose(first[:2], other[:2], atol=1e-6)  # the inertia-weighted and the plain one are not drawn
+    assert np.abs(first[2] - other[2]).max() > 1e-3
 
 
 @pytest.mark.parametrize("count", [1, 2, 3])
-def test_small_populations(problem: Make, count: int) -> None:
+def test_small_populations_begin_with_the_inertia_weighted_motion(problem: Make, guess: Guess, count: int) -> None:
     asked = problem(1, 12)
-    assert len(population(asked, asked.times, count, np.random.default_rng(0))) == count
+    motions = motions_of(asked, count)
+    assert len(motions) == count
+    np.testing.assert_allclose(motions[0], guess(asked), atol=1e-6)
 
 
 def test_a_path_out_of_reach_has_no_candidates(task: PositionTask, q_init: Array) -> None:
     line = Line(task.value(q_init[None])[0], np.array([1.0, 0.0]), 0.3)
     asked = Problem(task, Reference(line, RaisedCosine(1.0)), q_init, np.linspace(0, 1, 9))
-    assert len(population(asked, asked.times, 8, np.random.default_rng(0))) == 0
+    assert len(motions_of(asked, 8)) == 0
 
 
 def test_a_stretched_start_does_not_end_the_run(task: PositionTask) -> None:
     line = Line(task.value(np.zeros((1, 3)))[0], np.array([-1.0, 0.0]), 0.1)
     asked = Problem(task, Reference(line, RaisedCosine(1.0)), np.zeros(3), np.linspace(0, 1, 9))
-    motions = population(asked, asked.times, 8, np.random.default_rng(0))
-    assert np.isfinite(motions).all()
+    assert np.isfinite(motions_of(asked, 8)).all()
 
 
-def test_costs_are_backward_sums(problem: Make, peer: object, rng: np.random.Generator) -> None:
-    times = np.array([0.0, 0.1, 0.3, 0.35])
-    motions = rng.normal(size=(5, 4, 3))
-    costs = kinetic_energy_integrals(problem(1, 3), times, motions)
-    for motion, cost in zip(motions, costs, strict=True):
-        qd = np.diff(motion, axis=0) / np.diff(times)[:, None]
-        assert cost == pytest.approx(peer.energy(motion[1:], qd) @ np.diff(times), rel=1e-12)  # type: ignore[attr-defined]
+@pytest.mark.parametrize("draw", ["normal", "latin_hypercube"])
+def test_initial_configurations_share_the_end_effector(task: PositionTask, q_init: Array, draw: str) -> None:
+    first, same = (initial_configurations(task, q_init, 60, np.random.default_rng(2), draw=draw) for _ in range(2))
+    np.testing.assert_array_equal(first, same)
+    np.testing.assert_allclose(first[0], q_init, atol=1e-15)
+    assert 30 < len(first) <= 60
+    np.testing.assert_allclose(task.value(first), np.tile(task.value(q_init[None]), (len(first), 1)), atol=1e-9)
+    assert np.abs(first).max() <= np.pi
+    pairs = np.abs(first[:, None] - first).max(axis=2) + 10 * np.eye(len(first))
+    assert pairs.min() > 1e-3
+    assert len(initial_configurations(task, q_init, 1, np.random.default_rng(2), draw=draw)) == 1
+
+
+def test_costs_are_backward_sums(problem: Make, peer: SimpleNamespace, rng: np.random.Generator) -> None:
+    times, motions = np.array([0.0, 0.1, 0.3, 0.35]), rng.normal(size=(5, 4, 3))
+    asked = replace(problem(1, 3), objective=Objective(2.0, 0.1))
+    dt = np.diff(times)
+    for motion, value in zip(motions, objective_values(asked, times, motions), strict=True):
+        qd = np.diff(motion, axis=0) / dt[:, None]
+        qdd = np.diff(np.vstack([np.zeros(3), qd]), axis=0) / dt[:, None]
+        energy, torque = peer.energy(motion[1:], qd) @ dt, (peer.torque(motion[1:], qd, qdd) ** 2).sum(axis=1) @ dt
+        assert value == pytest.approx(2.0 * energy + 0.1 * torque, rel=1e-9)
+        both = integrals(asked, times, motion)
+        assert (both.kinetic_energy, both.torque) == pytest.approx((energy, torque), rel=1e-9)
 
 
 @given(st.floats(-3, 3), st.lists(st.integers(-3, 3), min_size=2, max_size=2))
@@ -83,13 +110,13 @@ def test_path_distance_does_not_count_full_turns(gap: float, turns: list[int]) -
     assert path_distance(path, moved, TURNS) == pytest.approx(abs(gap), abs=1e-12)
     wound = moved + 2 * np.pi * np.array([*turns, 0])
     assert path_distance(path, wound, TURNS) == pytest.approx(abs(gap), abs=1e-12)
-    slid = path + [0, 0, 2 * np.pi]
+    slid = path + np.array([0, 0, 2 * np.pi])
     assert path_distance(path, slid, TURNS) == pytest.approx(2 * np.pi)  # a slide of 6.28 m is one
 
 
 def test_distinct_keeps_the_cheapest_of_each_kind() -> None:
     base = np.zeros((3, 3))
-    motions = np.array([base, base + 0.005, base + [2 * np.pi, 0, 0], base + 0.5, base + 0.504, base + 1.0])
+    motions = np.array([base, base + 0.005, base + np.array([2 * np.pi, 0, 0]), base + 0.5, base + 0.504, base + 1.0])
     costs = np.array([3.0, 1.0, 2.0, 5.0, 4.0, 0.5])
     assert distinct(motions, costs, 10, 0.01, TURNS) == [5, 1, 4]
     assert distinct(motions, costs, 2, 0.01, TURNS) == [5, 1]

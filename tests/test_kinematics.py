@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -42,7 +41,7 @@ def test_weighted_by_one_is_the_plain_pseudoinverse(rng: np.random.Generator) ->
 
 @pytest.mark.parametrize("weighted", [False, True])
 def test_project_lands_on_reachable_targets(task: PositionTask, rng: np.random.Generator, weighted: bool) -> None:
-    q = rng.uniform(-1, 1, size=(60, 3)) + [0.0, 1.5, -1.4]
+    q = rng.uniform(-1, 1, size=(60, 3)) + np.array([0.0, 1.5, -1.4])
     target = task.value(q + rng.uniform(-0.15, 0.15, size=q.shape))
     before = q.copy()
     landed, left = project(task, q, target, random_inverse_weights(rng, 60, 3) if weighted else None)
@@ -69,7 +68,7 @@ def test_project_gets_off_a_singular_start(task: PositionTask) -> None:
 
 
 def test_place_finds_the_start_or_says_how_far_it_is(task: PositionTask, q_init: Array) -> None:
-    start = task.value(q_init[None])[0] + [-0.05, 0.03]
+    start = task.value(q_init[None])[0] + np.array([-0.05, 0.03])
     np.testing.assert_allclose(task.value(place(task, q_init, start)[None])[0], start, atol=1e-10)
     with pytest.raises(PathError, match=r"start \(2, 0\) m is out of reach: .* m of it from robot.q_init") as caught:
         place(task, q_init, np.array([2.0, 0.0]))

@@ -12,7 +12,7 @@ seeds = st.integers(0, 2**32 - 1).map(np.random.default_rng)
 
 def rosenbrock(x: Array) -> tuple[float, Array]:
     a, b = 1 - x[0], x[1] - x[0] ** 2
-    return a * a + 10 * b * b, np.array([-2 * a - 40 * x[0] * b, 20 * b])
+    return a * a + 0.5 * b * b, np.array([-2 * a - 2 * x[0] * b, b])
 
 
 def on_circle(x: Array) -> tuple[Array, Array]:

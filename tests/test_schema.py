@@ -46,15 +46,15 @@ class Inner:
 class Outer:
     free: float | None = number(None)
     law: str = choice("quintic", "quintic", "linear")
-    axes: list[str] = choices(["x"], "x", "y")
+    axes: list[str] = choices(["x"], "x", "y")  # noqa: RUF009
     on: bool = switch(True)
     label: str = text("a")
-    point: list[float] = numbers([0.0, 0.0], length=2, unit="m")
-    direction: float | list[float] = angle_or_vector(0.0)
-    table: dict[str, float] = mapping(any_number)
-    inner: Inner = part(Inner)
-    global_: Inner = part(Inner)
-    path: Line | Circle = one_of({"line": Line, "circle": Circle}, "line")
+    point: list[float] = numbers([0.0, 0.0], length=2, unit="m")  # noqa: RUF009
+    direction: float | list[float] = angle_or_vector(0.0)  # noqa: RUF009
+    table: dict[str, float] = mapping(any_number)  # noqa: RUF009
+    inner: Inner = part(Inner)  # noqa: RUF009
+    global_: Inner = part(Inner)  # noqa: RUF009
+    path: Line | Circle = one_of({"line": Line, "circle": Circle}, "line")  # noqa: RUF009
 
 
 NAN = float("nan")

@@ -2,7 +2,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import peer as peer_program
@@ -11,18 +13,41 @@ from conftest import differences
 from pydrake.autodiffutils import ExtractGradient, InitializeAutoDiff
 
 from pipeline.arrays import Array
-from pipeline.problem import Boundary, Problem
+from pipeline.path import ConstantSpeed
+from pipeline.problem import Boundary, Limits, Objective, Problem
 from pipeline.transcription import POSITION_SCALE, Transcription
 
 Make = Callable[[int, int], Problem]
 Guess = Callable[[Problem], Array]
 
 
+LIMITS = Limits(-2 * np.ones(3), 2 * np.ones(3), np.full(3, 3.8), np.full(3, 0.4), np.array([0.7, 0.7, np.inf]))
+KINDS: dict[str, dict[str, Any]] = {
+    "kinetic energy": {},
+    "torque": {"objective": Objective(0.0, 1.0)},
+    "both, limits": {"objective": Objective(1.0, 0.3), "limits": LIMITS},
+    "torque, limits, cyclic": {"objective": Objective(0.0, 1.0), "limits": LIMITS, "boundary": Boundary.CYCLIC},
+    "kinetic energy, free": {"boundary": Boundary.FREE},
+    "at speed": {"objective": Objective(0.5, 0.5), "timing": ConstantSpeed(10.0)},
+}
+
+
 @pytest.fixture
-def made(problem: Make, guess: Guess) -> Transcription:
-    """Trajectory 3 with 25 intervals: bindings of 10, 10 and 5 knots."""
-    asked = problem(3, 25)
-    return Transcription(asked, asked.times, guess(asked))
+def make(problem: Make, guess: Guess) -> Callable[..., Transcription]:
+    """Trajectory 3 with 25 intervals (bindings of 10, 10 and 5 knots) or another number of them, one of KINDS."""
+
+    def transcribe(kind: str = "kinetic energy", intervals: int = 25) -> Transcription:
+        asked, changes = problem(3, intervals), dict(KINDS[kind])
+        if "timing" in changes:
+            changes["reference"] = replace(asked.reference, timing=changes.pop("timing"))
+        return Transcription(replace(asked, **changes), asked.times, guess(asked))
+
+    return transcribe
+
+
+@pytest.fixture
+def made(make: Callable[..., Transcription]) -> Transcription:
+    return make()
 
 
 def program_value(made: Transcription, x: Array) -> Array:
@@ -40,7 +65,7 @@ def program_jacobian(made: Transcription, x: Array) -> Array:
             columns = program.FindDecisionVariableIndices(binding.variables())
             y = binding.evaluator().Eval(InitializeAutoDiff(x[columns]).ravel())
             block = np.zeros((len(y), len(x)))
-            block[:, columns] = ExtractGradient(y)
+            np.add.at(block, (slice(None), columns), ExtractGradient(y))  # a variable may stand twice
             if kind == "cost":
                 costs += block
             else:
@@ -53,39 +78,38 @@ def vector(made: Transcription, q: Array, qd: Array) -> Array:
     return np.concatenate([POSITION_SCALE * q.ravel(), w.ravel()])
 
 
+@pytest.mark.parametrize("intervals", [6, 25])
+@pytest.mark.parametrize("kind", KINDS)
 def test_derivatives_of_the_whole_program_equal_central_differences(
-    made: Transcription, rng: np.random.Generator
+    make: Callable[..., Transcription], rng: np.random.Generator, kind: str, intervals: int
 ) -> None:
-    for _ in range(3):
-        x = rng.normal(size=made.program.num_vars())
-        x[: made.y.size] *= POSITION_SCALE
-        got = program_jacobian(made, x)
-        expected = differences(lambda x: program_value(made, x), x, 1e-7)
-        assert expected.shape[0] == 1 + 25 * 2 + 25 * 3 + 3
-        scale = np.abs(expected).max(axis=1, keepdims=True)
-        assert np.abs((got - expected) / scale).max() < 2e-6
+    made = make(kind, intervals)
+    x = rng.normal(size=made.program.num_vars())
+    x[: made.y.size] *= POSITION_SCALE
+    got = program_jacobian(made, x)
+    expected = differences(lambda x: program_value(made, x), x, 1e-7)
+    scale = np.abs(expected).max(axis=1, keepdims=True)
+    assert np.abs((got - expected) / scale).max() < 5e-6
 
 
-def test_the_sparsity_pattern_covers_every_nonzero(made: Transcription, rng: np.random.Generator) -> None:
-    sizes = []
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_sparsity_pattern_covers_every_nonzero(
+    make: Callable[..., Transcription], rng: np.random.Generator, kind: str
+) -> None:
+    made = make(kind)
     for binding in made.program.generic_constraints():
         evaluator = binding.evaluator()
-        x = rng.normal(size=evaluator.num_vars()) * POSITION_SCALE
-        nonzero = set(
-            zip(*map(list, np.nonzero(ExtractGradient(evaluator.Eval(InitializeAutoDiff(x).ravel())))), strict=True)
-        )
-        pattern = set(evaluator.gradient_sparsity_pattern())
-        assert nonzero <= pattern
-        assert len(pattern) == 2 * evaluator.num_vars()
-        sizes.append(evaluator.num_vars() // 3)
-    assert sizes == [10, 10, 5]
+        y = evaluator.Eval(InitializeAutoDiff(rng.normal(size=evaluator.num_vars())).ravel())
+        pattern = evaluator.gradient_sparsity_pattern()
+        assert {tuple(entry) for entry in np.argwhere(ExtractGradient(y)).tolist()} <= set(pattern)
+        assert len(pattern) == len(set(pattern)) <= len(y) * 10  # sparse: a row knows 3 groups of 3 and its own torque
 
 
 def test_cost_and_rows_are_what_the_unknowns_mean(made: Transcription, rng: np.random.Generator) -> None:
     q, qd = rng.normal(size=(26, 3)), rng.normal(size=(25, 3))
     x, program, arm = vector(made, q, qd), made.program, made.arm
     cost = float(np.sum([program.EvalBinding(binding, x) for binding in program.GetAllCosts()]))
-    assert made.energy * cost == pytest.approx(arm.kinetic_energy(q[1:], qd) @ made.dt, rel=1e-10)
+    assert made.cost * cost == pytest.approx(arm.kinetic_energy(q[1:], qd) @ made.dt, rel=1e-10)
     tracking = np.concatenate([program.EvalBinding(b, x) for b in program.generic_constraints()])
     np.testing.assert_allclose(tracking.reshape(25, 2), made.problem.task.value(q[1:]), atol=1e-12)
     (link,) = program.linear_equality_constraints()
@@ -144,13 +168,12 @@ def test_reported_iterations_are_ipopts(made: Transcription, tmp_path: Path, lim
         assert printed
         counts.append((iterations, int(printed[1])))
         assert outcome.converged == (limit == 200)
-        assert outcome.status == ("optimal" if limit == 200 else "iteration limit reached")
+        assert ("iteration" in outcome.status) == (limit == 3)
     assert counts[0][0] == counts[0][1] > 0
     assert counts[1] == counts[0]  # a second solve of the same program counts from zero
 
 
-def test_a_boundary_that_is_not_served_is_refused(problem: Make, guess: Guess) -> None:
-    asked = problem(3, 5)
-    cyclic = Problem(asked.task, asked.reference, asked.q_init, asked.times, boundary=Boundary.CYCLIC)
-    with pytest.raises(ValueError, match="fixed"):
-        Transcription(cyclic, cyclic.times, guess(asked))
+def test_running_out_of_time_is_called_so(made: Transcription) -> None:
+    _, outcome, _ = made.solve(max_time=1e-6)
+    assert not outcome.converged
+    assert "time" in outcome.status

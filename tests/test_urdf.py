@@ -95,6 +95,7 @@ Q = {"shoulder": 0.7, "slide": 0.15, "elbow": -1.2, "wrist": 2.1}
 def test_limits_are_read_and_continuous_joints_have_none(write: Callable[[str], Path]) -> None:
     got = urdf.read(write(ROBOT), "hand")
     assert got.joints == tuple(Q)
+    assert "mesh" not in got.xml  # so that a missing one does not matter
     assert (got.name, got.base, got.end_effector) == ("test", "base", "hand")
     assert got.revolute.tolist() == [True, False, True, True]
     assert got.lower.tolist() == [-1.5, -0.1, -1.5, -np.inf]
@@ -163,7 +164,7 @@ FAULTS = [  # what is wrong, old text, new text, arguments, what the message mus
      '<link name="hand"/>', {}, ["hand", "inertial"]),
     ("negative inertia", INERTIA, 'ixx="-0.01" iyy="0.012" izz="0.015"', {}, ["upper", "-0.01"]),
     ("triangle inequality", INERTIA, 'ixx="0.01" iyy="0.012" izz="0.05"', {}, ["upper", "0.05"]),
-    ("inertia not a number", INERTIA, 'ixx="much" iyy="0.012" izz="0.05"', {}, ["upper", "not a number"]),
+    ("inertia not a number", INERTIA, 'ixx="much" iyy="0.012" izz="0.05"', {}, ["upper", "expected a number"]),
     ("inertia nan", INERTIA, 'ixx="nan" iyy="0.012" izz="0.015"', {}, ["upper"]),
     ("mass not a number", 'value="1.0"', 'value="heavy"', {}, ["upper", "heavy"]),
     ("mass nan", 'value="1.0"', 'value="nan"', {}, ["upper", "nan"]),

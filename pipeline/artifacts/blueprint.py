@@ -71,7 +71,7 @@ def _space(labels: Sequence[str], points: Array, planar: bool) -> Any:
     center = (points.min(axis=0) + points.max(axis=0)) / 2
     size = max(float(np.linalg.norm(points - center, axis=1).max()), 1e-6)
     direction = np.array([0.15, -0.75, 1.0] if planar else [1.0, -1.2, 0.7])
-    eye = center + 2.1 * size * direction / np.linalg.norm(direction)  # a sphere of `size` fills the field of view
+    eye = center + 2.4 * size * direction / np.linalg.norm(direction)  # a sphere of `size` fills the field of view
     return rrb.Spatial3DView(
         origin="/",
         contents=["/reference", *(f"/{slug(label)}/**" for label in labels)],

@@ -26,7 +26,7 @@ from scipy.ndimage import median_filter
 
 from pipeline.arrays import Array
 from pipeline.artifacts import style
-from pipeline.evaluate import Evaluation
+from pipeline.evaluation import Evaluation
 from pipeline.problem import Problem
 from pipeline.task import AXES
 
@@ -122,12 +122,12 @@ def stroboscopic(problem: Problem, evaluations: Sequence[Evaluation], name: str)
         axes.set_title(style.name(e.label), color=style.color(e.method), fontweight="bold", fontsize=11)
         for axis, dim, start, end in zip("xyz", dims, low, high, strict=False):
             axes.set(**{f"{axis}lim": (start, end), f"{axis}label": f"{AXES[dim]} [m]"})
-            getattr(axes, f"{axis}axis").set_major_locator(MaxNLocator(5, steps=[1, 2, 2.5, 5, 10]))
+            getattr(axes, f"{axis}axis").set_major_locator(MaxNLocator(5 if planar else 3, steps=[1, 2, 2.5, 5, 10]))
         if planar:
             axes.set_aspect("equal")
             _tidy(axes)
         else:
-            axes.set_box_aspect(high - low)
+            axes.set_box_aspect(high - low, zoom=0.88)
             axes.view_init(elev=22, azim=-55)
     bar = figure.colorbar(ScalarMappable(clock, TIME_RAMP), ax=panels, shrink=0.8, aspect=30, pad=0.02)
     bar.set_label("Time of the pose [s]")
@@ -196,6 +196,7 @@ def spectral_radius(problem: Problem, evaluations: Sequence[Evaluation], name: s
             arrowprops={"arrowstyle": "-", "color": style.color(e.label), "linewidth": 0.8},
         )
     bottom, top = axes.get_ylim()
+    axes.set_yticks([tick for tick in axes.get_yticks() if bottom <= tick <= top])
     axes.set_ylim(bottom - 0.3 * (top - bottom), top)
     _legend(figure, axes)
     return figure

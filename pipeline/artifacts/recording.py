@@ -25,8 +25,8 @@ from scipy.spatial.transform import Rotation
 from pipeline.arrays import Array
 from pipeline.artifacts import blueprint, style
 from pipeline.artifacts.blueprint import faded, pixels, rgba, slug
-from pipeline.evaluate import Evaluation
-from pipeline.problem import Problem
+from pipeline.evaluation import Evaluation
+from pipeline.problem import Problem, Status
 
 POSES = 12  # of the stroboscopic picture
 SOLID = 110  # opacity of the arms, of 255: those behind must shine through
@@ -54,7 +54,8 @@ def write(
         with _strict(), rr.RecordingStream("selfmotion") as recording:
             recording.save(temporary, default_blueprint=_layout(problem, evaluations))
             recording.send_recording_name(name)
-            recording.send_property("run", _facts(properties))
+            if facts := _facts(properties):
+                recording.send_property("run", facts)
             document = rr.TextDocument(summary, media_type=rr.MediaType.MARKDOWN)
             recording.log("summary", document, static=True)
             _send_reference(recording, problem)
@@ -102,7 +103,7 @@ def _layout(problem: Problem, evaluations: Sequence[Evaluation]) -> Any:
 
 def _ranges(evaluations: Sequence[Evaluation]) -> dict[str, tuple[float, float]]:
     """What to show of the energies: a motion that met a singularity shoots up there and would flatten all the others."""
-    usable = [evaluation for evaluation in evaluations if evaluation.solution.event_time is None]
+    usable = [evaluation for evaluation in evaluations if evaluation.status is Status.SOLVED]
     ranges = {}
     for entity in blueprint.ENERGIES if 0 < len(usable) < len(evaluations) else ():
         values = np.concatenate([getattr(evaluation, entity)[_finite(evaluation)] for evaluation in usable])

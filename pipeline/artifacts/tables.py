@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,8 @@ import numpy as np
 import pandas as pd
 
 from pipeline.config import PublishedConfig, RunConfig
-from pipeline.evaluate import Evaluation
+from pipeline.evaluation import Evaluation
+from pipeline.files import write_beside
 from pipeline.problem import Problem, Solution
 
 UNITS = {
@@ -215,17 +216,6 @@ def write_sweep(folder: Path) -> None:
     text = "\n".join([f"# Sweep {folder.name}", "", *_table(rows), ""])
     write_beside(folder / "sweep.md", lambda file: file.write_text(text, encoding="utf-8"))
     print(f"sweep table in {folder / 'sweep.md'}")
-
-
-def write_beside(file: Path, write: Callable[[Path], Any]) -> None:
-    """Write to a name beside `file` and rename, so that a killed run leaves no half file under a final name."""
-    file.parent.mkdir(parents=True, exist_ok=True)
-    unfinished = file.with_name(f".{file.name}.{os.getpid()}")
-    try:
-        write(unfinished)
-        os.replace(unfinished, file)
-    finally:
-        unfinished.unlink(missing_ok=True)
 
 
 def _natural(name: str) -> tuple[int, str]:

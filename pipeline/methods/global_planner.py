@@ -1,11 +1,13 @@
-"""The interpolation-based Global Kinematic Planner (Global paper Section 3): many coarse starts, each optimum refined.
+"""The interpolation-based Global Kinematic Planner (Global paper Section 3): many coarse starts, every optimum refined.
 
-The population of `candidates.py` is ranked by cost, the best distinct motions are optimised on a coarse grid, the
-distinct optima are carried to the fine grid by cubic interpolation, halving the step each time.
+Initial configurations and a population of motions are drawn and ranked (`candidates.py`), the best diverse ones are
+optimised on a coarse grid, and each distinct optimum is carried to the wanted knots by cubic splines, halving the step.
 """
 
 from __future__ import annotations
 
+from collections import Counter
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Any
 
@@ -13,55 +15,78 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from pipeline.arrays import Array
-from pipeline.candidates import distinct, kinetic_energy_integrals, population
+from pipeline.candidates import distinct, diverse, population, ranking, starting_points, wrap
 from pipeline.config import GlobalOptions
-from pipeline.problem import Problem, Progress, Solution, Status, Trajectory, no_progress
+from pipeline.costs import objective_values
+from pipeline.feasibility import least_violation
+from pipeline.parallel import Workers
+from pipeline.problem import Objective, Problem, Progress, Solution, Status, Trajectory, no_progress
 from pipeline.transcription import Transcription
 
 TRACKING = 1e-8  # [m] what an optimum must keep at every knot
+ELASTIC_STARTS = 4  # from how many motions the least violation is sought when no motion is feasible
+
+
+@dataclass(frozen=True)
+class Optimum:
+    """One local optimum on one grid, with the statistics of the solves that led to it."""
+
+    q: Array  # (N + 1, n)
+    cost: float
+    converged: bool
+    status: str
+    solves: list[dict[str, Any]] = field(default_factory=list)
 
 
 def solve(
-    problem: Problem, options: GlobalOptions = GlobalOptions(), seed: int = 1, progress: Progress = no_progress
+    problem: Problem,
+    options: GlobalOptions = GlobalOptions(),
+    seed: int = 1,
+    workers: Workers = Workers(),
+    progress: Progress = no_progress,
 ) -> list[Solution]:
     """All distinct optima found, best first; a single failed Solution if there is none."""
     grids = refinement(problem.times, options.coarse_steps)
-    rng = np.random.default_rng(seed)
-    revolute = problem.task.arm.description.revolute
-
-    coarse = grids[0]
-    motions = population(problem, coarse, options.candidates, rng)
+    motions, log = _starts(problem, grids[0], options, np.random.default_rng(seed))
     if not len(motions):
-        standing = np.tile(problem.q_init, (len(problem.times), 1))
-        message = "no candidate could follow the path to its end: it leaves the reach of the arm"
-        return [Solution("global", Trajectory(problem.times, standing), Status.INFEASIBLE, message)]
-    chosen = distinct(
-        motions, kinetic_energy_integrals(problem, coarse, motions), options.starts, options.same_path, revolute
-    )
-    starts = []
-    for number, index in enumerate(chosen):
-        starts.append(_optimise(problem, coarse, motions[index], options))
-        progress(number + 1, len(chosen), min(start.cost for start in starts))
+        message = "no candidate could follow the path from its start to its end: it leaves the reach of the arm"
+        return [_nothing(problem, Status.INFEASIBLE, message, log)]
 
-    solved = [start for start in starts if start.converged] or starts
-    costs = np.array([start.cost for start in solved])
-    basins = distinct(np.array([start.q for start in solved]), costs, len(solved), options.same_path, revolute)
-    log: dict[str, Any] = {
-        "candidates": len(motions),
-        "starts": len(starts),
-        "converged_starts": sum(start.converged for start in starts),
-        "grids": [len(grid) - 1 for grid in grids],
-        "start_solves": [start.statistics for start in starts],
-    }
-    refined = [_refine(problem, grids, solved[index], options) for index in basins]
-    final = distinct(
-        np.array([r.q for r in refined]), np.array([r.cost for r in refined]), len(refined), options.same_path, revolute
-    )
-    return [_report(problem, refined[index], rank + 1, log) for rank, index in enumerate(final)]
+    best = [np.inf]
+
+    def done(count: int, optimum: Optimum) -> None:
+        best[0] = min(best[0], optimum.cost) if optimum.converged else best[0]
+        progress(count, len(motions), best[0])
+
+    starts = workers.map(_optimise_start, (problem, grids[0], options), list(motions), done)
+    log["starts"] = [
+        {"converged": start.converged, "cost": start.cost, "status": start.status, "solves": start.solves}
+        for start in starts
+    ]
+    basins = [starts[index] for index in _basins(problem, starts, options)]
+    refined = workers.map(_refine, (problem, grids, options), basins)
+    found = [(fine, coarse) for fine, coarse in zip(refined, basins, strict=True) if fine.converged]
+    if not found:
+        return [_nothing(problem, *_why(problem, grids[0], starts), log)]
+    ranked = [found[index] for index in _distinct([fine for fine, _ in found], options, problem)]
+    solutions = []
+    for rank, (fine, coarse) in enumerate(ranked):
+        members = {"starts_in_basin": _members(problem, coarse, starts, options), "solves": fine.solves}
+        solutions.append(
+            Solution(
+                "global",
+                Trajectory(problem.times, fine.q),
+                Status.SOLVED,
+                optimum=rank + 1,
+                tracking_tolerance=TRACKING,
+                statistics={**(log if rank == 0 else {}), **members},
+            )
+        )
+    return solutions
 
 
 def refinement(times: Array, coarse_steps: int) -> list[Array]:
-    """Grids from coarse to fine: about coarse_steps intervals, doubled until the wanted knots `times` are reached."""
+    """Grids from coarse to fine: at most coarse_steps intervals, doubled until the wanted knots `times` are reached."""
     intervals = len(times) - 1
     sizes = [intervals]
     while sizes[0] > coarse_steps:
@@ -70,18 +95,56 @@ def refinement(times: Array, coarse_steps: int) -> list[Array]:
     return [np.interp(np.linspace(0, intervals, size + 1), place, times) for size in sizes]
 
 
-class _Optimum:
-    """One local optimum on one grid, with the statistics of the solves that led to it."""
+def _starts(
+    problem: Problem, coarse: Array, options: GlobalOptions, rng: np.random.Generator
+) -> tuple[Array, dict[str, Any]]:
+    """The motions (K, N + 1, n) to optimise on the coarse grid, and how they came about."""
+    parts: list[Array] = []
+    log: dict[str, Any] = {}
+    revolute = problem.task.arm.description.revolute
+    if options.starts != "dynamic_programming":
+        configurations = starting_points(problem, options.configurations, rng, options.draw, options.spread)
+        count = options.candidates or (len(coarse) * problem.task.arm.n) ** 2
+        motions = population(problem, coarse, configurations, count, rng)
+        log |= {"configurations": len(configurations), "candidates": len(motions)}
+        if len(motions):
+            costs = ranking(problem, coarse, motions, options.limit_weight)
+            parts.append(motions[diverse(motions, costs, options.optimised, options.same_path, revolute)])
+    if options.starts != "population":
+        from pipeline.methods import dynamic_programming
 
-    def __init__(self, q: Array, cost: float, converged: bool, status: str, statistics: list[dict[str, Any]]) -> None:
-        self.q, self.cost, self.converged, self.status, self.statistics = q, cost, converged, status, statistics
+        paths = dynamic_programming.starts(problem, coarse)
+        log["dynamic_programming_paths"] = len(paths)
+        parts.append(paths)
+    empty = np.empty((0, len(coarse), problem.task.arm.n))
+    return np.concatenate(parts) if parts else empty, log
 
 
-def _optimise(problem: Problem, times: Array, guess: Array, options: GlobalOptions) -> _Optimum:
-    q, outcome, iterations = Transcription(problem, times, guess).solve(
-        tolerance=options.tolerance, max_iterations=options.max_iterations
-    )
-    cost = float(kinetic_energy_integrals(problem, times, q[None])[0])
+def _optimise_start(context: tuple[Problem, Array, GlobalOptions], guess: Array) -> Optimum:
+    """One start on the coarse grid. Torques are optimised from a motion of little energy within the same limits.
+
+    From a wild motion the torque program fails often; and where even that energy program is infeasible, so is it.
+    """
+    problem, times, options = context
+    solves: list[dict[str, Any]] = []
+    bounds = problem.bounds
+    torque_counts = problem.objective.torque > 0 or np.isfinite(bounds.torque).any() or np.isfinite(bounds.power).any()
+    if torque_counts:
+        free = np.full(problem.task.arm.n, np.inf)
+        smooth = replace(problem, objective=Objective(), limits=replace(bounds, torque=free, power=free))
+        first = _optimise(smooth, times, guess, options)
+        solves += first.solves
+        if not first.converged:
+            return replace(first, solves=solves)
+        guess = first.q
+    optimum = _optimise(problem, times, guess, options)
+    return replace(optimum, solves=solves + optimum.solves)
+
+
+def _optimise(problem: Problem, times: Array, guess: Array, options: GlobalOptions) -> Optimum:
+    program = Transcription(problem, times, guess)
+    q, outcome, iterations = program.solve(tolerance=options.tolerance, max_iterations=options.max_iterations)
+    cost = float(objective_values(problem, times, q[None])[0])
     entry = {
         "intervals": len(times) - 1,
         "iterations": iterations,
@@ -89,27 +152,49 @@ def _optimise(problem: Problem, times: Array, guess: Array, options: GlobalOptio
         "status": outcome.status,
         "cost": cost,
     }
-    return _Optimum(q, cost, outcome.converged, outcome.status, [entry])
+    return Optimum(q, cost, outcome.converged, outcome.status, [entry])
 
 
-def _refine(problem: Problem, grids: list[Array], start: _Optimum, options: GlobalOptions) -> _Optimum:
-    optimum, statistics = start, list(start.statistics)
+def _refine(context: tuple[Problem, list[Array], GlobalOptions], start: Optimum) -> Optimum:
+    problem, grids, options = context
+    optimum, solves = start, list(start.solves)
     for coarse, fine in pairwise(grids):
         optimum = _optimise(problem, fine, CubicSpline(coarse, optimum.q)(fine), options)
-        statistics += optimum.statistics
-    return _Optimum(optimum.q, optimum.cost, optimum.converged, optimum.status, statistics)
+        solves += optimum.solves
+    return replace(optimum, solves=solves)
 
 
-def _report(problem: Problem, optimum: _Optimum, rank: int, log: dict[str, Any]) -> Solution:
-    trajectory = Trajectory(problem.times, optimum.q)
-    statistics = {**(log if rank == 1 else {}), "solves": optimum.statistics}
-    if optimum.converged:
-        return Solution(
-            "global", trajectory, Status.SOLVED, optimum=rank, tracking_tolerance=TRACKING, statistics=statistics
-        )
-    gap = np.abs(problem.task.value(optimum.q) - problem.reference.position(problem.times)).max()
-    message = f"{optimum.status}; the path is missed by up to {gap:.1e} m"
-    status = Status.INFEASIBLE if gap > 1e-6 else Status.NOT_CONVERGED
-    return Solution(
-        "global", trajectory, status, message, optimum=rank, tracking_tolerance=TRACKING, statistics=statistics
-    )
+def _basins(problem: Problem, starts: list[Optimum], options: GlobalOptions) -> list[int]:
+    """Indices of the starts that stand for the distinct optima of the coarse grid, best first."""
+    solved = [index for index, start in enumerate(starts) if start.converged]
+    return [solved[index] for index in _distinct([starts[index] for index in solved], options, problem)]
+
+
+def _distinct(optima: list[Optimum], options: GlobalOptions, problem: Problem) -> list[int]:
+    if not optima:
+        return []
+    motions, costs = np.array([o.q for o in optima]), np.array([o.cost for o in optima])
+    return distinct(motions, costs, len(optima), options.same_path, problem.task.arm.description.revolute)
+
+
+def _members(problem: Problem, optimum: Optimum, starts: list[Optimum], options: GlobalOptions) -> int:
+    """How many starts fell into the basin of one coarse optimum."""
+    solved = [start.q - optimum.q for start in starts if start.converged]
+    revolute = problem.task.arm.description.revolute
+    return int((np.abs(wrap(np.array(solved), revolute)).max(axis=(1, 2)) <= options.same_path).sum())
+
+
+def _nothing(problem: Problem, status: Status, message: str, log: dict[str, Any], q: Array | None = None) -> Solution:
+    motion = np.tile(problem.q_init, (len(problem.times), 1)) if q is None else q
+    return Solution("global", Trajectory(problem.times, motion), status, message, statistics=log)
+
+
+def _why(problem: Problem, times: Array, starts: list[Optimum]) -> tuple[Status, str]:
+    """No start converged: name the limit that cannot be met and the least violation found, or the solver's own words."""
+    words = Counter(start.status for start in starts).most_common(1)[0][0]
+    if problem.bounds.any:
+        nearest = sorted(starts, key=lambda start: start.cost)[:ELASTIC_STARTS]
+        violation = least_violation(problem, times, [start.q for start in nearest])
+        if violation is not None and violation.relative > 1e-4:
+            return Status.INFEASIBLE, violation.sentence
+    return Status.NOT_CONVERGED, f"none of {len(starts)} starts converged (most often: {words})"

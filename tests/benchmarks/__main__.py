@@ -14,15 +14,14 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from pipeline.config import GlobalOptions, PmkeOptions
+from pipeline.config import GlobalOptions, PmkeOptions, check
 from pipeline.methods import global_planner, pmke
 from pipeline.run import PROJECT, prepare
-from pipeline.config import check
 from pipeline.shooting import Window
 from pipeline.transcription import Transcription
 
 sys.path.insert(0, str(Path(__file__).parent))
-import peer  # noqa: E402
+import peer
 
 REPEATS = 7
 

@@ -73,9 +73,9 @@ def evaluate(problem: Problem, solution: Solution) -> Evaluation:
     qd, qdd = differences(trajectory, problem.boundary, problem.reference.timing.at_rest)
     plant = _Plant(arm)
     count, n = q.shape
-    tau, energy, radius = np.empty((count, n)), np.empty(count), np.empty(count)
-    skeleton, singular = np.empty((count, n + 1, 3)), np.empty(count)
-    for i in range(count):
+    tau, energy, radius = np.full((count, n), np.nan), np.full(count, np.nan), np.full(count, np.nan)
+    skeleton, singular = np.full((count, n + 1, 3), np.nan), np.full(count, np.nan)
+    for i in np.flatnonzero(np.isfinite(np.hstack([q, qd, qdd])).all(axis=1)):  # Drake refuses other values
         plant.at(q[i], qd[i])
         energy[i] = plant.kinetic_energy()
         tau[i] = plant.torque(qdd[i])
