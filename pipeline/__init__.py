@@ -35,6 +35,12 @@ _PUBLIC = {
     "lsv": "pipeline.methods.lsv",
     "pmke": "pipeline.methods.pmke",
     "global_planner": "pipeline.methods.global_planner",
+    "dynamic_programming": "pipeline.methods.dynamic_programming",
+    "calculus_of_variations": "pipeline.methods.calculus_of_variations",
+    "Boundary": "pipeline.problem",
+    "Limits": "pipeline.problem",
+    "Objective": "pipeline.problem",
+    "Workers": "pipeline.parallel",
     "evaluate": "pipeline.evaluation",
 }
 __all__ = sorted(_PUBLIC)
@@ -44,4 +50,4 @@ def __getattr__(name: str) -> Any:
     if name not in _PUBLIC:
         raise AttributeError(f"module 'pipeline' has no attribute '{name}'")
     module = importlib.import_module(_PUBLIC[name])
-    return module if name in ("lsv", "pmke", "global_planner") else getattr(module, name)
+    return module if _PUBLIC[name].startswith("pipeline.methods.") else getattr(module, name)

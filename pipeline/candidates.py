@@ -8,68 +8,12 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm, qmc
 
 from pipeline.arrays import Array
 from pipeline.costs import objective_values
-from pipeline.kinematics import project, pseudoinverse
+from pipeline.kinematics import project, wrap
 from pipeline.problem import Boundary, Problem
-from pipeline.task import PositionTask
-
-SELF_MOTION_STEPS = 24
-
-
-def initial_configurations(
-    task: PositionTask,
-    q_init: Array,
-    count: int,
-    rng: np.random.Generator,
-    *,
-    draw: str = "normal",
-    spread: float = 2.0,
-) -> Array:
-    """Configurations (<= count, n) with the end effector of q_init (n,), reached from it by random self-motion.
-
-    Eq. (17): qd = (I - J+ J) p for one unit of time, p (n,) [rad] with standard deviation `spread`, drawn from a normal
-    distribution or a Latin hypercube. Each is closed on the end effector to 1e-10 m, wrapped and kept once; the first
-    is q_init itself.
-    """
-    n = task.arm.n
-    if draw == "normal":
-        perturbation = rng.normal(scale=spread, size=(count - 1, n))
-    else:
-        perturbation = spread * norm.ppf(qmc.LatinHypercube(n, rng=rng).random(count - 1))
-    x = task.value(q_init[None])
-    q = np.tile(q_init, (count - 1, 1))
-
-    def slope(q: Array) -> Array:
-        jacobian = task.jacobian(q)
-        along = np.einsum("kmn,kn->km", jacobian, perturbation)
-        return perturbation - np.einsum("knm,km->kn", pseudoinverse(jacobian), along)
-
-    step = 1.0 / SELF_MOTION_STEPS
-    for _ in range(SELF_MOTION_STEPS if count > 1 else 0):
-        middle = slope(q + step / 2 * slope(q))
-        q = q + step * middle
-    if count > 1:
-        q, error = project(task, q, np.tile(x, (count - 1, 1)))
-        q = q[error < 1e-10]
-    q = wrap(np.vstack([q_init, q]), task.arm.description.revolute)
-    return unique(q, task.arm.description.revolute)
-
-
-def wrap(q: Array, revolute: NDArray[np.bool_]) -> Array:
-    """Angles in [-pi, pi), prismatic positions as they are."""
-    return np.where(revolute, (q + np.pi) % (2 * np.pi) - np.pi, q)
-
-
-def unique(q: Array, revolute: NDArray[np.bool_], same: float = 1e-3) -> Array:
-    """Rows of q (K, n) without those that repeat an earlier one within `same` [rad], full turns not counted."""
-    kept: list[int] = []
-    for index in range(len(q)):
-        if not kept or np.abs(wrap(q[kept] - q[index], revolute)).max(axis=1).min() > same:
-            kept.append(index)
-    return q[kept]
+from pipeline.self_motion import random_configurations
 
 
 def random_inverse_weights(rng: np.random.Generator, count: int, n: int) -> Array:
@@ -140,11 +84,11 @@ def ranking(problem: Problem, times: Array, motions: Array, limit_weight: float)
     return cost
 
 
-def starting_points(problem: Problem, count: int, rng: np.random.Generator, draw: str, spread: float) -> Array:
-    """The initial configurations a boundary allows: q_init alone, or those spread by self-motion."""
+def starting_points(problem: Problem, count: int, rng: np.random.Generator, draw: str) -> Array:
+    """The initial configurations (C, n) a boundary allows: q_init alone, or those spread by random self-motion."""
     if problem.boundary is Boundary.FIXED:
         return problem.q_init[None]
-    return initial_configurations(problem.task, problem.q_init, count, rng, draw=draw, spread=spread)
+    return random_configurations(problem.task, problem.q_init, count, rng, draw)
 
 
 def path_distance(a: Array, b: Array, revolute: NDArray[np.bool_]) -> float:

@@ -28,7 +28,8 @@ from pipeline.schema import (
     text,
 )
 
-METHODS = ("lsv", "pmke", "global")
+METHODS = ("lsv", "pmke", "global", "dynamic_programming", "calculus_of_variations")
+DEFAULT_METHODS = ("lsv", "pmke", "global")
 
 
 @dataclass(frozen=True)
@@ -148,8 +149,7 @@ class GlobalOptions:
 
     starts: str = choice("population", "population", "dynamic_programming", "both")
     configurations: int = count(66)
-    draw: str = choice("normal", "normal", "latin_hypercube")
-    spread: float = number(2.0, above=0, unit="rad")
+    draw: str = choice("normal", "normal", "latin_hypercube", "uniform")
     candidates: int | None = count(None)
     optimised: int = count(48)
     limit_weight: float = number(0.01, low=0)
@@ -157,6 +157,27 @@ class GlobalOptions:
     tolerance: float = number(1e-8, above=0)
     max_iterations: int = count(300)
     same_path: float = number(0.05, above=0, unit="rad")
+
+
+@dataclass(frozen=True)
+class DynamicProgrammingOptions:
+    """Dynamic programming on a grid of the self-motion manifold (r = 1)."""
+
+    nodes: int = count(360, low=8)
+    intervals: int | None = count(25, low=2)
+    velocity_slack: float = number(0.0, low=0)
+    same_path: float = number(0.2, above=0, unit="rad")
+
+
+@dataclass(frozen=True)
+class CalculusOfVariationsOptions:
+    """Stationary motions of the kinetic-energy integral (r = 1, no limits)."""
+
+    spacing: float = number(0.03, above=0, unit="rad")
+    refinements: int = count(3, low=0)
+    scan_tolerance: float = number(1e-6, above=0)
+    tolerance: float = number(1e-10, above=0)
+    max_speed: float | None = number(None, above=0, unit="rad/s")
 
 
 @dataclass(frozen=True)
@@ -173,6 +194,17 @@ class MethodConfig:
     lsv: LsvOptions = part(LsvOptions)
     pmke: PmkeOptions = part(PmkeOptions)
     global_: GlobalOptions = part(GlobalOptions)
+    dynamic_programming: DynamicProgrammingOptions = part(DynamicProgrammingOptions)
+    calculus_of_variations: CalculusOfVariationsOptions = part(CalculusOfVariationsOptions)
+
+
+@dataclass(frozen=True)
+class CandidateStudyConfig:
+    """The Global paper's Fig. 1: how near the best of so many candidates comes to the optimum."""
+
+    run: bool = switch(False)
+    most: int = count(10000, low=10)
+    repeats: int = count(5)
 
 
 @dataclass(frozen=True)
@@ -189,7 +221,7 @@ class RunConfig:
     """Everything that one run needs."""
 
     name: str = text("run")
-    methods: list[str] = choices(METHODS, *METHODS)
+    methods: list[str] = choices(DEFAULT_METHODS, *METHODS)
     seed: int = count(1, low=0)
     robot: RobotConfig = part(RobotConfig)
     path: LineConfig | CircleConfig | WaypointsConfig = one_of(
@@ -201,6 +233,7 @@ class RunConfig:
     boundary: BoundaryConfig = part(BoundaryConfig)
     method: MethodConfig = part(MethodConfig)
     parallel: ParallelConfig = part(ParallelConfig)
+    candidate_study: CandidateStudyConfig = part(CandidateStudyConfig)
     published: PublishedConfig = part(PublishedConfig)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline.arrays import Array
 from pipeline.errors import PathError
@@ -22,6 +23,16 @@ def weighted_pseudoinverse(jacobian: Array, inverse_weight: Array) -> Array:
     right = inverse_weight @ np.swapaxes(jacobian, -1, -2)
     # The pseudoinverse of the inner matrix lets an exactly singular configuration pass.
     return np.asarray(right @ np.linalg.pinv(jacobian @ right, rcond=1e-12, hermitian=True))
+
+
+def wrap(difference: Array, revolute: NDArray[np.bool_]) -> Array:
+    """Joint differences (..., n) with full turns of the turning joints taken off: at most half a turn remains."""
+    return difference - np.where(revolute, 2 * np.pi, 0.0) * np.rint(difference / (2 * np.pi))
+
+
+def wrap_angles(q: Array, revolute: NDArray[np.bool_]) -> Array:
+    """Configurations (..., n) with their turning joints in (-pi, pi]."""
+    return q - np.where(revolute, 2 * np.pi, 0.0) * np.ceil((q - np.pi) / (2 * np.pi))
 
 
 def project(

@@ -13,12 +13,13 @@ from typing import Any
 import numpy as np
 
 from pipeline import config as schema
+from pipeline import extras
 from pipeline.arm import Arm
 from pipeline.arrays import Array
 from pipeline.errors import ConfigError, PathError, RobotError
 from pipeline.evaluation import evaluate
 from pipeline.kinematics import place, project
-from pipeline.methods import global_planner, lsv, pmke
+from pipeline.methods import calculus_of_variations, dynamic_programming, global_planner, lsv, pmke
 from pipeline.parallel import Workers
 from pipeline.path import (
     ConstantSpeed,
@@ -81,6 +82,8 @@ def solve(
         "lsv": lambda: [lsv.solve(problem, options.lsv)],
         "pmke": lambda: [pmke.solve(problem, options.pmke)],
         "global": lambda: global_planner.solve(problem, options.global_, config.seed, workers, progress),
+        "dynamic_programming": lambda: dynamic_programming.solve(problem, options.dynamic_programming),
+        "calculus_of_variations": lambda: calculus_of_variations.solve(problem, options.calculus_of_variations),
     }
     results = []
     for method in config.methods:
@@ -92,7 +95,7 @@ def solve(
 
 def run_and_write(config: schema.RunConfig, folder: File) -> int:
     """One whole run into `folder`; returns the exit code."""
-    from pipeline.artifacts import figures, recording, tables
+    from pipeline.artifacts import figures, recording, study_figure, tables
     from pipeline.console import Console
 
     stages: dict[str, float] = {}
@@ -114,14 +117,19 @@ def run_and_write(config: schema.RunConfig, folder: File) -> int:
     evaluations = [evaluate(problem, solution) for solutions, _ in results for solution in solutions]
     wall_times = {solutions[0].method: seconds for solutions, seconds in results}
     timed("evaluate", begin)
+    begin = time.perf_counter()
+    extra = extras.compute(problem, config, evaluations)
+    timed("extras", begin)
 
     begin = time.perf_counter()
     summary = tables.summary(evaluations, wall_times, config.published)
-    markdown = tables.markdown(config, problem, evaluations, summary)
-    tables.write(folder, evaluations, summary, markdown)
+    markdown = tables.markdown(config, problem, evaluations, summary, extra)
+    tables.write(folder, evaluations, summary, markdown, extra)
     timed("tables", begin)
     begin = time.perf_counter()
     figures.write(folder / "figures", problem, evaluations, name=config.name)
+    if extra.study is not None:
+        study_figure.write(folder / "figures", extra.study, name=config.name)
     timed("figures", begin)
     begin = time.perf_counter()
     facts = {"experiment": config.name, "seed": config.seed, "robot": config.robot.name, **versions()}

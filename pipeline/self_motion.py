@@ -18,6 +18,7 @@ from scipy.stats import qmc
 
 from pipeline.arrays import Array
 from pipeline.errors import InputError, PathError
+from pipeline.kinematics import wrap, wrap_angles
 from pipeline.task import PositionTask
 
 CLOSED = 1e-11  # [m] how well a node holds its task point
@@ -52,16 +53,6 @@ class Loop:
         return self.q[left] + _hermite(
             ((s - self.s[left]) / span)[:, None], chord, self.tangent[left], self.tangent[right], span[:, None]
         )
-
-
-def wrap(difference: Array, revolute: NDArray[np.bool_]) -> Array:
-    """Joint differences (..., n) with full turns of the turning joints taken off: at most half a turn remains."""
-    return difference - np.where(revolute, 2 * np.pi, 0.0) * np.rint(difference / (2 * np.pi))
-
-
-def wrap_angles(q: Array, revolute: NDArray[np.bool_]) -> Array:
-    """Configurations (..., n) with their turning joints in (-pi, pi]."""
-    return q - np.where(revolute, 2 * np.pi, 0.0) * np.ceil((q - np.pi) / (2 * np.pi))
 
 
 def tangent(jacobian: Array) -> Array:

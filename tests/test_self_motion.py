@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from pipeline import urdf
 from pipeline.arm import Arm
 from pipeline.errors import InputError, PathError
-from pipeline.self_motion import KINDS, manifold, manifolds, on_manifold, random_configurations, tangent, wrap
+from pipeline.kinematics import wrap
+from pipeline.self_motion import KINDS, manifold, manifolds, on_manifold, random_configurations, tangent
 from pipeline.task import PositionTask
 
 ROBOT = Path(__file__).parents[1] / "robots" / "planar3r.urdf"

@@ -7,8 +7,8 @@ What a singular motion does after its singularity is drawn faint and dotted: it 
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +27,7 @@ from scipy.ndimage import median_filter
 from pipeline.arrays import Array
 from pipeline.artifacts import style
 from pipeline.evaluation import Evaluation
+from pipeline.files import write_beside
 from pipeline.problem import Problem
 from pipeline.task import AXES
 
@@ -46,12 +47,8 @@ def write(folder: Path, problem: Problem, evaluations: Sequence[Evaluation], *, 
     files = []
     for draw in (reference, energy, stroboscopic, joints, torques, spectral_radius, tracking):
         file = folder / f"{draw.__name__}.png"
-        part = file.with_name(f".{file.name}.part")
-        try:
-            draw(problem, evaluations, name).savefig(part, format="png", dpi=DPI)
-            os.replace(part, file)
-        finally:
-            part.unlink(missing_ok=True)
+        figure = draw(problem, evaluations, name)
+        write_beside(file, partial(figure.savefig, format="png", dpi=DPI))
         files.append(file)
     return files
 

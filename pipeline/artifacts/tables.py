@@ -13,8 +13,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from pipeline import certificate
 from pipeline.config import PublishedConfig, RunConfig
 from pipeline.evaluation import Evaluation
+from pipeline.extras import Extras
 from pipeline.files import write_beside
 from pipeline.problem import Problem, Solution
 
@@ -68,6 +70,9 @@ def _row(e: Evaluation) -> dict[str, Any]:
         "min_singular_value": e.singular_value.min(),
         "min_spectral_radius": e.spectral_radius[radius],
         "min_spectral_radius_time": e.time[radius],
+        "starts_in_basin": e.solution.statistics.get("starts_in_basin", np.nan),
+        "grid_error": e.solution.statistics.get("grid_error", np.nan),
+        "kind": e.solution.statistics.get("kind", ""),
         "singular_time": np.nan if e.solution.event_time is None else e.solution.event_time,
     }
 
@@ -84,7 +89,9 @@ def trajectories(evaluations: Sequence[Evaluation]) -> pd.DataFrame:
     return pd.concat(parts, ignore_index=True)
 
 
-def markdown(config: RunConfig, problem: Problem, evaluations: Sequence[Evaluation], table: pd.DataFrame) -> str:
+def markdown(
+    config: RunConfig, problem: Problem, evaluations: Sequence[Evaluation], table: pd.DataFrame, extras: Extras
+) -> str:
     """The summary for people: a row per quantity and a column per motion, published values and differences beside."""
     reference = problem.reference
     arm = problem.task.arm.description
@@ -99,6 +106,17 @@ def markdown(config: RunConfig, problem: Problem, evaluations: Sequence[Evaluati
         "",
     ]
     lines += [f"- **{e.label}**: {e.message or e.status.value}" for e in evaluations]
+    if extras.certificate is not None:
+        grid = next(e for e in evaluations if e.method == "dynamic_programming")
+        lines += ["", f"Certificate: {certificate.sentence(extras.certificate, len(grid.time) - 1)}."]
+    if extras.validation is not None:
+        lines += ["", "## Planner and calculus of variations", "", *_table(_cells(extras.validation))]
+    if extras.study is not None:
+        study = extras.study
+        lines += [
+            "",
+            f"Candidates: distance = exp({study.intercept:.4f}) N^{study.exponent:.4f} from N = {study.parameters} on; the paper prints exp(-4.0733) N^-0.2030.",
+        ]
     if config.published.document:
         lines += ["", f"Printed values: {config.published.document}. {config.published.note}".rstrip()]
     lines += [
@@ -114,7 +132,11 @@ def _by_quantity(evaluations: Sequence[Evaluation], table: pd.DataFrame) -> list
     rows = [["", *(e.label for e in evaluations)]]
     skipped = ("method", "optimum", "message")
     for column in table.columns:
-        if column in skipped or column.startswith(("published_", "difference_")) or table[column].isna().all():
+        if (
+            column in skipped
+            or column.startswith(("published_", "difference_"))
+            or table[column].isin(["", np.nan]).all()
+        ):
             continue
         unit = UNITS.get(column, UNITS.get(re.sub(r"_\d+$", "", column), ""))
         cells = []
@@ -133,8 +155,21 @@ def _table(rows: list[list[str]]) -> list[str]:
     return [head, "|---|" + "---:|" * (len(rows[0]) - 1), *body]
 
 
-def write(folder: Path, evaluations: Sequence[Evaluation], table: pd.DataFrame, text: str) -> None:
-    """summary.csv, summary.md and trajectories.parquet."""
+def _cells(table: pd.DataFrame) -> list[list[str]]:
+    rows = [[column.replace("_", " ") for column in table.columns]]
+    for record in table.to_numpy():
+        rows.append(["" if pd.isna(cell) else cell if isinstance(cell, str) else f"{cell:.5g}" for cell in record])
+    return rows
+
+
+def write(folder: Path, evaluations: Sequence[Evaluation], table: pd.DataFrame, text: str, extras: Extras) -> None:
+    """summary.csv, summary.md, trajectories.parquet, and validation.csv and candidate_study.csv where they exist."""
+    if extras.validation is not None:
+        validation = extras.validation
+        write_beside(folder / "validation.csv", lambda file: validation.to_csv(file, index=False))
+    if extras.study is not None:
+        curve = pd.DataFrame({"candidates": extras.study.count, "distance": extras.study.distance})
+        write_beside(folder / "candidate_study.csv", lambda file: curve.to_csv(file, index=False))
     write_beside(folder / "summary.csv", lambda file: table.to_csv(file, index=False))
     write_beside(folder / "summary.md", lambda file: file.write_text(text, encoding="utf-8"))
     write_beside(folder / "trajectories.parquet", lambda file: trajectories(evaluations).to_parquet(file, index=False))

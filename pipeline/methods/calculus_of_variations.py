@@ -25,10 +25,11 @@ from scipy.integrate import DOP853
 from scipy.optimize import elementwise
 
 from pipeline.arrays import Array
+from pipeline.config import CalculusOfVariationsOptions
 from pipeline.errors import InputError
-from pipeline.kinematics import pseudoinverse
+from pipeline.kinematics import pseudoinverse, wrap
 from pipeline.problem import Boundary, Problem, Progress, Solution, Status, Trajectory, no_progress
-from pipeline.self_motion import manifold, on_manifold, tangent, wrap
+from pipeline.self_motion import manifold, on_manifold, tangent
 
 TRACKING = 1e-10  # [m]
 ROOT = 1e-6  # of the residual's scale: what a root must reach; a jump through zero does not
@@ -41,21 +42,6 @@ JUMP = 0.5  # [rad] between the final configurations of neighbours in the scan: 
 
 
 @dataclass(frozen=True)
-class CalculusOfVariationsOptions:
-    """spacing [rad]: of the scan along the initial self-motion manifold. scan_tolerance, tolerance: of the integration.
-
-    refinements: how often intervals of the scan are split where the final configuration jumps or a double root may hide.
-    max_speed [rad/s]: of the scanned initial null-space speeds of a fixed start; None: once around the manifold in T.
-    """
-
-    spacing: float = 0.03
-    refinements: int = 3
-    scan_tolerance: float = 1e-6
-    tolerance: float = 1e-10
-    max_speed: float | None = None
-
-
-@dataclass(frozen=True)
 class _Family:
     """Starts by one unknown u in [low, high]: u (P,) -> q (P, n), qd (P, n)."""
 
@@ -65,7 +51,11 @@ class _Family:
     closed: bool
 
 
-def solve(problem: Problem, options: CalculusOfVariationsOptions, progress: Progress = no_progress) -> list[Solution]:
+def solve(
+    problem: Problem,
+    options: CalculusOfVariationsOptions = CalculusOfVariationsOptions(),
+    progress: Progress = no_progress,
+) -> list[Solution]:
     """All stationary motions on problem.times, cheapest first. Their statistics: `energy_integral` [J s] in continuous
     time, `kind` (minimum or saddle), `index`, `unknown` [rad or rad/s] and `residual` t' M qd at T.
     """

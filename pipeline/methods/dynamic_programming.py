@@ -20,28 +20,16 @@ from numpy.typing import NDArray
 
 from pipeline.arrays import Array
 from pipeline.candidates import distinct
+from pipeline.config import DynamicProgrammingOptions
 from pipeline.errors import InputError
+from pipeline.kinematics import wrap
 from pipeline.problem import Boundary, Problem, Progress, Solution, Status, Trajectory, no_progress
-from pipeline.self_motion import manifolds, wrap
+from pipeline.self_motion import manifolds
 
 Index = NDArray[np.intp]
 PAIRS = 2**16  # node pairs per batch: what stays in the processor's cache
 TRACKING = 1e-10  # [m] what every node keeps
 STRIDE = 8  # first spacing, in nodes, of the starts that a cyclic problem is solved from
-
-
-@dataclass(frozen=True)
-class DynamicProgrammingOptions:
-    """nodes: of the longest manifold along the path. intervals: of the time grid; None: the problem's own.
-
-    velocity_slack: by how many node spacings a step may exceed a velocity limit (0: every path honours the limits).
-    same_path [rad]: paths closer than this count as one.
-    """
-
-    nodes: int = 360
-    intervals: int | None = 25
-    velocity_slack: float = 0.0
-    same_path: float = 0.2
 
 
 @dataclass(frozen=True)
@@ -110,7 +98,9 @@ def _difference(end: Array, start: Array, turning: bool) -> Array:
     return np.asarray(gap)
 
 
-def solve(problem: Problem, options: DynamicProgrammingOptions, progress: Progress = no_progress) -> list[Solution]:
+def solve(
+    problem: Problem, options: DynamicProgrammingOptions = DynamicProgrammingOptions(), progress: Progress = no_progress
+) -> list[Solution]:
     """Distinct grid optima on the grid's own knots, best first; the first is the global one, with its grid error.
 
     Torque and power limits are not part of a first-order grid: with them the costs are those of a relaxed problem.

@@ -35,6 +35,7 @@ class Optimum:
     cost: float
     converged: bool
     status: str
+    continuous: bool = True  # False: between its knots the motion leaves the path, it jumps from branch to branch
     solves: list[dict[str, Any]] = field(default_factory=list)
 
 
@@ -52,22 +53,23 @@ def solve(
         message = "no candidate could follow the path from its start to its end: it leaves the reach of the arm"
         return [_nothing(problem, Status.INFEASIBLE, message, log)]
 
-    best = [np.inf]
-
-    def done(count: int, optimum: Optimum) -> None:
-        best[0] = min(best[0], optimum.cost) if optimum.converged else best[0]
-        progress(count, len(motions), best[0])
-
-    starts = workers.map(_optimise_start, (problem, grids[0], options), list(motions), done)
+    while True:
+        starts = _optimise_starts(problem, grids[0], options, motions, workers, progress)
+        if any(start.converged for start in starts) or len(grids) == 1:
+            break
+        # A coarse grid can be infeasible where a finer one is not: its finite differences are other numbers.
+        motions, grids = CubicSpline(grids[0], motions, axis=1)(grids[1]), grids[1:]
+    log["grids"] = [len(grid) - 1 for grid in grids]
     log["starts"] = [
         {"converged": start.converged, "cost": start.cost, "status": start.status, "solves": start.solves}
         for start in starts
     ]
     basins = [starts[index] for index in _basins(problem, starts, options)]
     refined = workers.map(_refine, (problem, grids, options), basins)
-    found = [(fine, coarse) for fine, coarse in zip(refined, basins, strict=True) if fine.converged]
+    found = [(fine, coarse) for fine, coarse in zip(refined, basins, strict=True) if fine.converged and fine.continuous]
+    log["jumping_optima"] = sum(fine.converged and not fine.continuous for fine in refined)
     if not found:
-        return [_nothing(problem, *_why(problem, grids[0], starts), log)]
+        return [_nothing(problem, *_why(problem, grids[-1], starts, refined), log)]
     ranked = [found[index] for index in _distinct([fine for fine, _ in found], options, problem)]
     solutions = []
     for rank, (fine, coarse) in enumerate(ranked):
@@ -103,7 +105,7 @@ def _starts(
     log: dict[str, Any] = {}
     revolute = problem.task.arm.description.revolute
     if options.starts != "dynamic_programming":
-        configurations = starting_points(problem, options.configurations, rng, options.draw, options.spread)
+        configurations = starting_points(problem, options.configurations, rng, options.draw)
         count = options.candidates or (len(coarse) * problem.task.arm.n) ** 2
         motions = population(problem, coarse, configurations, count, rng)
         log |= {"configurations": len(configurations), "candidates": len(motions)}
@@ -118,6 +120,19 @@ def _starts(
         parts.append(paths)
     empty = np.empty((0, len(coarse), problem.task.arm.n))
     return np.concatenate(parts) if parts else empty, log
+
+
+def _optimise_starts(
+    problem: Problem, grid: Array, options: GlobalOptions, motions: Array, workers: Workers, progress: Progress
+) -> list[Optimum]:
+    best = np.inf
+
+    def done(count: int, optimum: Optimum) -> None:
+        nonlocal best
+        best = min(best, optimum.cost) if optimum.converged else best
+        progress(count, len(motions), best)
+
+    return workers.map(_optimise_start, (problem, grid, options), list(motions), done)
 
 
 def _optimise_start(context: tuple[Problem, Array, GlobalOptions], guess: Array) -> Optimum:
@@ -161,7 +176,17 @@ def _refine(context: tuple[Problem, list[Array], GlobalOptions], start: Optimum)
     for coarse, fine in pairwise(grids):
         optimum = _optimise(problem, fine, CubicSpline(coarse, optimum.q)(fine), options)
         solves += optimum.solves
-    return replace(optimum, solves=solves)
+    return replace(optimum, solves=solves, continuous=_stays_on_path(problem, grids[-1], optimum.q))
+
+
+def _stays_on_path(problem: Problem, times: Array, q: Array) -> bool:
+    """Whether the cubic spline through the knots follows the path between them, to 1 % of its length.
+
+    A finite-difference program also has optima that jump to another branch of the manifold within one interval.
+    """
+    middle = (times[1:] + times[:-1]) / 2
+    gap = problem.task.value(CubicSpline(times, q)(middle)) - problem.reference.position(middle)
+    return bool(np.linalg.norm(gap, axis=1).max() <= 0.01 * problem.reference.geometry.length)
 
 
 def _basins(problem: Problem, starts: list[Optimum], options: GlobalOptions) -> list[int]:
@@ -189,8 +214,13 @@ def _nothing(problem: Problem, status: Status, message: str, log: dict[str, Any]
     return Solution("global", Trajectory(problem.times, motion), status, message, statistics=log)
 
 
-def _why(problem: Problem, times: Array, starts: list[Optimum]) -> tuple[Status, str]:
-    """No start converged: name the limit that cannot be met and the least violation found, or the solver's own words."""
+def _why(problem: Problem, times: Array, starts: list[Optimum], refined: list[Optimum]) -> tuple[Status, str]:
+    """Nothing was found: the limit that cannot be met and the least violation found, or the solver's own words."""
+    if any(start.converged for start in starts):
+        words = "; ".join(
+            sorted({optimum.status if not optimum.converged else "jumps between branches" for optimum in refined})
+        )
+        return Status.NOT_CONVERGED, f"{len(refined)} optima of the coarse grid were lost on a finer one ({words})"
     words = Counter(start.status for start in starts).most_common(1)[0][0]
     if problem.bounds.any:
         nearest = sorted(starts, key=lambda start: start.cost)[:ELASTIC_STARTS]

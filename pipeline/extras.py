@@ -1,0 +1,42 @@
+"""What only some runs have beside their motions: the certificate, the validation table, the candidate study."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import pandas as pd
+
+from pipeline import candidate_study, certificate, validation
+from pipeline.config import RunConfig
+from pipeline.costs import objective_values
+from pipeline.evaluation import Evaluation
+from pipeline.problem import Problem
+
+
+@dataclass(frozen=True)
+class Extras:
+    """Each is None where the run does not ask for it."""
+
+    certificate: dict[str, float] | None = None
+    validation: pd.DataFrame | None = None
+    study: candidate_study.Study | None = None
+
+
+def compute(problem: Problem, config: RunConfig, evaluations: Sequence[Evaluation]) -> Extras:
+    """The extras that the methods of this run make possible."""
+    pair = certificate.comparable([evaluation.solution for evaluation in evaluations])
+    methods = {evaluation.method for evaluation in evaluations}
+    return Extras(
+        certificate=None if pair is None else certificate.certify(problem, *pair),
+        validation=validation.table(problem, evaluations) if methods >= {"global", "calculus_of_variations"} else None,
+        study=_study(problem, config, evaluations) if config.candidate_study.run else None,
+    )
+
+
+def _study(problem: Problem, config: RunConfig, evaluations: Sequence[Evaluation]) -> candidate_study.Study | None:
+    found = [e for e in evaluations if e.method == "global" and e.confirmed]
+    if not found:
+        return None
+    optimum = float(objective_values(problem, problem.times, found[0].q[None])[0])
+    return candidate_study.study(problem, optimum, config.method.global_, config.candidate_study, config.seed)

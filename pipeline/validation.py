@@ -1,0 +1,66 @@
+"""The planner's optima beside the stationary motions of the calculus of variations (Global paper Section 4.1, Table 4)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+
+from pipeline.candidates import path_distance
+from pipeline.evaluation import Evaluation
+from pipeline.kinematics import wrap
+from pipeline.problem import Problem
+
+SAME = 0.3  # [rad] largest joint difference at which a discrete and a continuous motion are the same optimum
+
+
+def table(problem: Problem, evaluations: Sequence[Evaluation]) -> pd.DataFrame:
+    """One row per motion of either method, paired by joint path; a motion without a partner says why."""
+    revolute = problem.task.arm.description.revolute
+    planner = [e for e in evaluations if e.method == "global" and e.confirmed]
+    stationary = [e for e in evaluations if e.method == "calculus_of_variations" and e.confirmed]
+    rows, used = [], set()
+    for e in planner:
+        distances = [path_distance(e.q, other.q, revolute) for other in stationary]
+        partner = int(np.argmin(distances)) if distances else -1
+        row = {"planner_optimum": e.solution.optimum, "planner_energy": e.energy_integral[-1]}
+        if partner >= 0 and distances[partner] < SAME:
+            used.add(partner)
+            other = stationary[partner]
+            row |= {
+                "stationary_motion": other.solution.optimum,
+                "stationary_energy": other.solution.statistics["energy_integral"],
+                "mean_absolute_difference": float(np.abs(wrap(e.q - other.q, revolute)).mean()),
+                "kind": other.solution.statistics["kind"],
+            }
+        else:
+            row["remark"] = (
+                "no stationary motion near it: an optimum of the finite-difference sum on these knots that continuous time "
+                "does not have; it moves or disappears on finer grids (timing.steps)"
+            )
+        rows.append(row)
+    for index, other in enumerate(stationary):
+        if index not in used:
+            kind = other.solution.statistics["kind"]
+            remark = (
+                "the planner did not find it"
+                if kind == "minimum"
+                else "not a minimum: the planner does not look for it"
+            )
+            rows.append(
+                {
+                    "stationary_motion": other.solution.optimum,
+                    "stationary_energy": other.solution.statistics["energy_integral"],
+                    "kind": kind,
+                    "remark": remark,
+                }
+            )
+    columns = [
+        "planner_optimum",
+        "planner_energy",
+        "stationary_motion",
+        "stationary_energy",
+        "mean_absolute_difference",
+    ]
+    return pd.DataFrame(rows, columns=[*columns, "kind", "remark"])
