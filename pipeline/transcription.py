@@ -28,8 +28,8 @@ from pipeline.costs import Costs, integrals, velocities
 from pipeline.differentiable import DifferentiableConstraint, DifferentiableCost
 from pipeline.problem import Boundary, Problem
 
-POSITION_SCALE = 0.01
-VELOCITY_SCALE = 0.01  # for objectives without kinetic energy: small, like the positions
+POSITION_SCALE = 0.03
+VELOCITY_SCALE = 0.03  # for objectives without kinetic energy: small, like the positions
 KNOTS_PER_BINDING = 10  # a Python binding pays for its size squared: more, smaller bindings are cheaper up to a point
 Block = NDArray[np.int_]
 

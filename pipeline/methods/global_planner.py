@@ -15,10 +15,11 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from pipeline.arrays import Array
-from pipeline.candidates import distinct, diverse, population, ranking, starting_points, wrap
+from pipeline.candidates import distinct, diverse, population, ranking, starting_points
 from pipeline.config import GlobalOptions
 from pipeline.costs import objective_values
 from pipeline.feasibility import least_violation
+from pipeline.kinematics import wrap
 from pipeline.parallel import Workers
 from pipeline.problem import Objective, Problem, Progress, Solution, Status, Trajectory, no_progress
 from pipeline.transcription import Transcription
@@ -167,7 +168,7 @@ def _optimise(problem: Problem, times: Array, guess: Array, options: GlobalOptio
         "status": outcome.status,
         "cost": cost,
     }
-    return Optimum(q, cost, outcome.converged, outcome.status, [entry])
+    return Optimum(q, cost, outcome.converged, outcome.status, solves=[entry])
 
 
 def _refine(context: tuple[Problem, list[Array], GlobalOptions], start: Optimum) -> Optimum:
