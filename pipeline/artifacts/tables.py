@@ -47,6 +47,8 @@ def summary(
             for column, printed in published.values.get(evaluation.method, {}).items():
                 row[f"published_{column}"] = printed
                 row[f"difference_{column}"] = row[column] / printed - 1 if column in row else np.nan
+            if evaluation is evaluations[0] and published.note:
+                row["published_note"] = published.note
         rows.append(row)
     return pd.DataFrame(rows)
 
@@ -248,7 +250,8 @@ def write_sweep(folder: Path) -> None:
         rows.append(
             [row["run"], "" if pd.isna(label) else label, row["status"], *cells, "" if pd.isna(message) else message]
         )
-    text = "\n".join([f"# Sweep {folder.name}", "", *_table(rows), ""])
+    notes = table["published_note"].dropna().unique() if "published_note" in table else []
+    text = "\n".join([f"# Sweep {folder.name}", "", *_table(rows), "", *(f"- {note}" for note in notes), ""])
     write_beside(folder / "sweep.md", lambda file: file.write_text(text, encoding="utf-8"))
     print(f"sweep table in {folder / 'sweep.md'}")
 

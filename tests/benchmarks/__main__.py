@@ -22,6 +22,7 @@ from pipeline.transcription import Transcription
 
 sys.path.insert(0, str(Path(__file__).parent))
 import peer
+import planner
 
 REPEATS = 7
 
@@ -90,11 +91,17 @@ def fine_solve() -> None:
     report("fine global solve (303 parameters)", ours, theirs, note)
 
 
-def main() -> None:
-    print(f"{'medians':<34} {'ours [ms]':>9} {'peer [ms]':>9} {'ratio':>7}")
-    predictions()
-    fine_solve()
+def main(words: list[str]) -> None:
+    """All parts, or only `small` or `planner`, and of that only the simulations named."""
+    if words and words[0] not in ("small", "planner"):
+        sys.exit(f"{words[0]}: not one of small, planner")
+    if words[:1] != ["planner"]:
+        print(f"{'medians':<34} {'ours [ms]':>9} {'peer [ms]':>9} {'ratio':>7}")
+        predictions()
+        fine_solve()
+    if words[:1] != ["small"]:
+        planner.main(words[1:])
 
 
 if __name__ == "__main__":
-    main()
+    main(sys.argv[1:])

@@ -9,6 +9,7 @@ from __future__ import annotations
 import xml.etree.ElementTree as ET
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -59,6 +60,12 @@ class PlanarArm:
             vy += rate[i] * self.length[i] * ca.cos(angle[i])
         return energy
 
+    def inverse_dynamics(self, q: ca.SX, qd: ca.SX, qdd: ca.SX) -> ca.SX:
+        """Joint torques by Lagrange's equations, without gravity."""
+        energy = self.kinetic_energy(q, qd)
+        momentum = ca.gradient(energy, qd)
+        return ca.jtimes(momentum, qd, qdd) + ca.jtimes(momentum, q, qd) - ca.gradient(energy, q)
+
 
 def kinetic_energy_program(arm: PlanarArm, intervals: int, dt: float, tolerance: float = 1e-8) -> ca.Function:
     """nlpsol over q_1..q_N (N n,), parameters q_0 and the path (2 N); backward differences, mass matrix at the interval's end."""
@@ -78,3 +85,70 @@ def solve(program: ca.Function, start: Array, path: Array, guess: Array) -> tupl
     """q (N, n), the cost, and CasADi's statistics, from `guess` (N, n) along `path` (N, 2)."""
     result = program(x0=guess.ravel(), p=np.concatenate([start, path.ravel()]), lbg=0.0, ubg=0.0)
     return np.array(result["x"]).reshape(guess.shape), float(result["f"]), program.stats()
+
+
+@dataclass
+class Program:
+    """min of the integral of T or |tau|^2 over q_0..q_N by backward differences, on even knots, with what limits there are.
+
+    boundary: free (from rest, q_0 unknown) or cyclic (q_N = q_0, and the velocity before the first knot is the last).
+    limits: lower, upper, velocity, torque, power, one (n,) each. options: IPOPT's, without the prefix.
+    """
+
+    arm: PlanarArm
+    times: Array
+    path: Array  # (N + 1, 2)
+    torque: bool
+    cyclic: bool
+    limits: tuple[Array, Array, Array, Array, Array]
+    options: dict[str, Any]
+
+    def __post_init__(self) -> None:
+        n, intervals = len(self.arm.length), len(self.times) - 1
+        dt = float(self.times[-1] - self.times[0]) / intervals
+        lower, upper, velocity, torque, power = self.limits
+        state, rate, acceleration = (ca.SX.sym(name, n) for name in ("q", "qd", "qdd"))
+        energy = self.arm.kinetic_energy(state, rate)
+        tau = self.arm.inverse_dynamics(state, rate, acceleration)
+        term = ca.sumsqr(tau) if self.torque else energy
+        kept = [(rate, velocity), (tau, torque), (tau * rate, power)]
+        limited = [(quantity[i], bound[i]) for quantity, bound in kept for i in range(n) if np.isfinite(bound[i])]
+        stage = ca.Function("stage", [state, rate, acceleration], [term, ca.vertcat(*(row for row, _ in limited))])
+        tip = ca.Function("tip", [state], [self.arm.end_effector(state)])
+
+        free = intervals if self.cyclic else intervals + 1  # knots that are unknown
+        unknown, scale = ca.MX.sym("q", n, free), ca.MX.sym("scale")
+        q = ca.horzcat(unknown, unknown[:, 0]) if self.cyclic else unknown
+        qd = (q[:, 1:] - q[:, :-1]) / dt
+        qdd = (qd - ca.horzcat(qd[:, -1] if self.cyclic else ca.MX.zeros(n), qd[:, :-1])) / dt
+        terms, rows = stage.map(intervals)(q[:, 1:], qd, qdd)
+        gaps = ca.vec(tip.map(free)(unknown) - self.path[:free].T)
+        bound = np.tile([value for _, value in limited], intervals)
+        self.bounds = {
+            "lbx": np.tile(lower, free),
+            "ubx": np.tile(upper, free),
+            "lbg": np.concatenate([np.zeros(2 * free), -bound]),
+            "ubg": np.concatenate([np.zeros(2 * free), bound]),
+        }
+        cost = ca.sum2(terms) * dt
+        program = {"x": ca.vec(unknown), "p": scale, "f": cost / scale, "g": ca.vertcat(gaps, ca.vec(rows))}
+        names = {f"ipopt.{key}": value for key, value in self.options.items()}
+        self.solver = ca.nlpsol("peer", "ipopt", program, {**QUIET, **names})
+        self.evaluate = ca.Function("evaluate", [program["x"]], [cost, program["g"]])
+        self.free = free
+
+    def solve(self, guess: Array) -> tuple[Array, float, dict]:
+        """q (N + 1, n), its cost, and CasADi's statistics; the objective is divided by its value at the guess."""
+        start = guess[: self.free].ravel()
+        result = self.solver(x0=start, p=float(self.evaluate(start)[0]), **self.bounds)
+        q = np.array(result["x"]).reshape(self.free, -1)
+        cost = float(self.evaluate(q.ravel())[0])
+        return (np.vstack([q, q[:1]]) if self.cyclic else q), cost, self.solver.stats()
+
+    def check(self, q: Array) -> tuple[float, float]:
+        """The cost of q (N + 1, n) and by how much it misses its path or exceeds a limit, in their units."""
+        x = q[: self.free].ravel()
+        cost, rows = self.evaluate(x)
+        parts = ((np.array(rows).ravel(), self.bounds["lbg"], self.bounds["ubg"]), (x, self.bounds["lbx"], self.bounds["ubx"]))
+        excess = max(float(np.maximum(low - value, value - high).max()) for value, low, high in parts)
+        return float(cost), excess

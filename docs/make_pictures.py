@@ -1,0 +1,67 @@
+"""`make pictures`: the README's pictures from a fresh run of trajectory 3. Needs the viewer's system libraries."""
+
+from __future__ import annotations
+
+import io
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from PIL import Image
+
+DOCS = Path(__file__).resolve().parent
+WIDTH, COLORS = 1200, 128
+
+
+def small(image: Image.Image, file: Path) -> None:
+    """Save at most WIDTH pixels wide, with a palette: a picture in a repository stays small."""
+    image = image.convert("RGB")
+    if image.width > WIDTH:
+        image = image.resize((WIDTH, round(image.height * WIDTH / image.width)), Image.Resampling.LANCZOS)
+    image.quantize(COLORS, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE).save(file, optimize=True)
+    print(f"{file.name}: {file.stat().st_size // 1024} kB")
+
+
+def screenshot(recording: Path, at: float) -> Image.Image:
+    """What the viewer shows of a recording at time `at` [s]."""
+    from rerun.experimental import ViewerClient
+
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    command = [sys.executable, "-m", "rerun", "--headless", "--bind", "127.0.0.1", "--port", str(port)]
+    viewer = subprocess.Popen([*command, "--hide-welcome-screen"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    try:
+        for _ in range(100):
+            with socket.socket() as probe:
+                if probe.connect_ex(("127.0.0.1", port)) == 0:
+                    break
+            time.sleep(0.1)
+        client = ViewerClient(f"rerun+http://127.0.0.1:{port}/proxy")
+        client.open([str(recording)])
+        while client.get_state().loading or not client.get_state().views:
+            time.sleep(0.2)
+        client.set_time("time", duration=at, play_state="paused")
+        before = b""
+        while (now := client.take_screenshot(None)) != before:
+            before = now
+            time.sleep(0.5)
+        return Image.open(io.BytesIO(now))
+    finally:
+        viewer.terminate()
+        viewer.wait()
+
+
+def main() -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        subprocess.run([sys.executable, "-m", "pipeline", "+experiment=traj3", f"hydra.run.dir={folder}"], check=True)
+        small(Image.open(Path(folder) / "figures" / "stroboscopic.png"), DOCS / "stroboscopic.png")
+        small(Image.open(Path(folder) / "figures" / "energy.png"), DOCS / "energy.png")
+        small(screenshot(Path(folder) / "recording.rrd", 4.0), DOCS / "recording.png")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,155 @@
+"""The global planner's multi-start on the Global paper's simulations beside the same multi-start in CasADi + IPOPT.
+
+The peer gets the planner's own starts, grids, splines between grids, choice of basins and tolerances; only the solves
+differ. Timed are the solves: not imports, not the drawing of the starts, and not CasADi's construction of its functions.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any
+from unittest import mock
+
+import numpy as np
+import peer
+from hydra import compose, initialize_config_dir
+
+from pipeline import session
+from pipeline.arrays import Array
+from pipeline.config import GlobalOptions
+from pipeline.costs import objective_values
+from pipeline.methods import dynamic_programming, global_planner
+from pipeline.methods.global_planner import Optimum
+from pipeline.problem import Boundary, Problem
+from pipeline.run import PROJECT, prepare
+
+SIMULATIONS = ("sim1", "sim2", "sim3", "sim4", "sim5")
+CONVERGED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
+HEAD = f"{'planner: the same multi-start':<34} {'ours [s]':>9} {'peer [s]':>9} {'ratio':>7}"
+
+
+@dataclass
+class Side:
+    """One way to solve a program from a guess, and the time that its solves took."""
+
+    optimise: Callable[[Problem, Array, Array, GlobalOptions], Optimum]
+    seconds: float = 0.0
+    starts: list[Optimum] = field(default_factory=list)
+    optima: list[Optimum] = field(default_factory=list)
+
+    def run(self, step: Callable[[Any, Any], Optimum], context: Any, item: Any) -> Optimum:
+        """The planner's own `step`, every solve of it by this side."""
+
+        def timed(*arguments: Any) -> Optimum:
+            begin = time.perf_counter()
+            answer = self.optimise(*arguments)
+            self.seconds += time.perf_counter() - begin
+            return answer
+
+        with mock.patch.object(global_planner, "_optimise", timed):
+            return step(context, item)
+
+
+class Peer(Side):
+    """CasADi's side: one program per grid and kind of problem, made when first needed."""
+
+    def __init__(self) -> None:
+        super().__init__(self._solve)
+        self.construction = 0.0
+        self.programs: dict[tuple[int, bool, bool], peer.Program] = {}
+        self.arm = peer.PlanarArm.from_urdf(PROJECT / "robots" / "planar3r.urdf")
+
+    def program(self, problem: Problem, times: Array, options: GlobalOptions) -> peer.Program:
+        limits, torque = problem.bounds, problem.objective.torque > 0
+        key = (len(times), torque, bool(np.isfinite(limits.torque).any()))
+        if key not in self.programs:
+            begin = time.perf_counter()
+            self.programs[key] = peer.Program(
+                self.arm,
+                times,
+                problem.reference.position(times),
+                torque,
+                problem.boundary is Boundary.CYCLIC,
+                (limits.lower, limits.upper, limits.velocity, limits.torque, limits.power),
+                {
+                    "tol": options.tolerance,
+                    "max_iter": options.max_iterations,
+                    "bound_relax_factor": 0.0,
+                    "constr_viol_tol": 1e-8,
+                    "acceptable_tol": 1e-6,
+                    "acceptable_constr_viol_tol": 1e-8,
+                },
+            )
+            passed = time.perf_counter() - begin
+            self.construction += passed
+            self.seconds -= passed  # it happens within a timed solve
+        return self.programs[key]
+
+    def _solve(self, problem: Problem, times: Array, guess: Array, options: GlobalOptions) -> Optimum:
+        q, cost, statistics = self.program(problem, times, options).solve(guess)
+        status = statistics["return_status"]
+        return Optimum(q, cost, status in CONVERGED, status)
+
+
+def simulation(name: str) -> None:
+    """One line for the multi-start, one for `starts=dynamic_programming` where that applies, and the optima of all."""
+    with initialize_config_dir(str(PROJECT / "conf"), version_base="1.3"):
+        config = session.checked(compose("config", overrides=[f"+experiment={name}"]))
+    problem, options = prepare(config), config.method.global_
+    grids = global_planner.refinement(problem.times, options.coarse_steps)
+    motions, _ = global_planner._starts(problem, grids[0], options, np.random.default_rng(config.seed))
+    ours, theirs = Side(global_planner._optimise), Peer()
+    sides = (ours, theirs)
+    for number, motion in enumerate(motions):
+        for side in sides if number % 2 else sides[::-1]:
+            side.starts.append(side.run(global_planner._optimise_start, (problem, grids[0], options), motion))
+    for side in sides:
+        basins = global_planner._basins(problem, side.starts, options)
+        fine = [side.run(global_planner._refine, (problem, grids, options), side.starts[basin]) for basin in basins]
+        side.optima = keep(problem, options, fine)
+    counts = [sum(start.converged for start in side.starts) for side in sides]
+    note = f"of {len(motions)} starts {counts[0]} and {counts[1]} converged; CasADi built its functions in"
+    line(f"{name}, population", ours.seconds, theirs.seconds, f"{note} {theirs.construction:.2f} s besides")
+    found = {"ours": ours.optima, "peer": theirs.optima}
+    if not problem.objective.torque:
+        begin = time.perf_counter()
+        solutions = global_planner.solve(problem, replace(options, starts="dynamic_programming"), config.seed)
+        seconds = time.perf_counter() - begin
+        grown = np.array([solution.trajectory.q for solution in solutions if solution.statistics.get("solves")])
+        costs = objective_values(problem, problem.times, grown)
+        found["dp"] = [Optimum(q, float(cost), True, "") for q, cost in zip(grown, costs, strict=True)]
+        line(f"{name}, dynamic_programming", seconds, theirs.seconds, "the whole planner against the same peer")
+    for label, optima in found.items():
+        print(f"  {label:<5}{'  '.join(f'{optimum.cost:.6f}' for optimum in optima)}")
+    agreement(problem, theirs.program(problem, problem.times, options), found)
+
+
+def keep(problem: Problem, options: GlobalOptions, fine: list[Optimum]) -> list[Optimum]:
+    good = [optimum for optimum in fine if optimum.converged and optimum.continuous]
+    return [good[index] for index in global_planner._distinct(good, options, problem)]
+
+
+def agreement(problem: Problem, program: peer.Program, found: dict[str, list[Optimum]]) -> None:
+    """Every optimum judged by the other side's formulas, and how near the two sides' optima are to each other."""
+    everything = [optimum for optima in found.values() for optimum in optima]
+    checks = [program.check(optimum.q) for optimum in everything]
+    costs = objective_values(problem, problem.times, np.array([optimum.q for optimum in everything]))
+    apart = max(abs(check[0] / cost - 1) for check, cost in zip(checks, costs, strict=True))
+    print(f"  recomputed by both: costs within {apart:.0e}, path and limits kept to {max(c[1] for c in checks):.0e}")
+
+
+def line(name: str, ours: float, theirs: float, note: str) -> None:
+    print(f"{name:<34} {ours:9.2f} {theirs:9.2f} {ours / theirs:7.2f}   {note}", flush=True)
+
+
+def main(names: list[str]) -> None:
+    unknown = set(names) - set(SIMULATIONS)
+    if unknown:
+        sys.exit(f"{', '.join(sorted(unknown))}: not one of {', '.join(SIMULATIONS)}")
+    np.zeros(dynamic_programming.STRIDE)
+    print(HEAD)
+    for name in names or SIMULATIONS:
+        simulation(name)

@@ -1,0 +1,57 @@
+"""The README is true: its Python runs, its commands are accepted, its files exist."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+from hydra import compose, initialize_config_dir
+
+from pipeline import run, session
+from pipeline.__main__ import CONF
+
+ROOT = Path(__file__).resolve().parent.parent
+TEXTS = {name: (ROOT / name).read_text(encoding="utf-8") for name in ("README.md", "docs/errata.md")}
+COMMANDS = sorted(
+    {line.split("  ")[0] for text in TEXTS.values() for line in re.findall(r"python -m pipeline([^`\n]*)", text)}
+)
+
+
+def _values(word: str) -> list[str]:
+    """One override per value of a swept key."""
+    key, _, value = word.partition("=")
+    return [f"{key}={one}" for one in value.split(",")] if not value.startswith("[") else [word]
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_commands_state_a_problem(command: str) -> None:
+    words = [word for word in shlex.split(command) if word not in ("-m", "--cfg", "job")]
+    for number in range(max(len(_values(word)) for word in words) if words else 1):
+        overrides = [_values(word)[min(number, len(_values(word)) - 1)] for word in words]
+        with initialize_config_dir(CONF, version_base="1.3"):
+            run.prepare(session.checked(compose("config", overrides=overrides)))
+
+
+def test_python_example_runs(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(ROOT)
+    (example,) = re.findall(r"```python\n(.*?)```", TEXTS["README.md"], re.S)
+    exec(compile(example, "README.md", "exec"), {})
+    first = capsys.readouterr().out.splitlines()[0].split()
+    assert first[:2] == ["global", "solved"]
+    assert float(first[2]) == pytest.approx(6.093e-3, rel=1e-3)
+    assert float(first[3]) < 1e-8
+
+
+@pytest.mark.parametrize("name", TEXTS)
+def test_files_named_exist(name: str) -> None:
+    named = re.findall(r"`((?:pipeline|conf|docs|tests|robots)/[\w/.]*)`", TEXTS[name])
+    pictures = re.findall(r"\]\((docs/[\w.]+)\)", TEXTS[name])
+    assert all((ROOT / file).exists() for file in named + pictures)
+    assert named
+
+
+def test_make_targets_exist() -> None:
+    targets = set(re.findall(r"^(\w+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.M))
+    assert set(re.findall(r"(?<=make )(?:run|test|help|bench)", TEXTS["README.md"])) <= targets
