@@ -64,15 +64,48 @@ def _worst(
     return Violation(kind, names[joint], float(limit), float(reached), float(times[knot]), float(excess[knot, joint]))
 
 
-def least_violation(problem: Problem, times: Array, guesses: list[Array]) -> Violation | None:
-    """Let all limits give way by the same fraction and minimise it, from several motions; None if no solve succeeds."""
-    best: Violation | None = None
+@dataclass(frozen=True)
+class Relaxed:
+    """A motion q (N + 1, n) on the path that exceeds its limits as little as could be found, and the worst of them."""
+
+    q: Array
+    worst: Violation
+
+    @property
+    def feasible(self) -> bool:
+        return self.worst.relative <= 1e-6
+
+
+def least_violation(problem: Problem, times: Array, guesses: list[Array]) -> Relaxed | None:
+    """The limit to blame: the kind that, given way alone, lets a motion exist with the least excess.
+
+    If no kind suffices alone, all give way together. None if no solve succeeds. A motion without any excess is feasible:
+    the way to it led through motions that are not, which other solves do not dare.
+    """
+    kinds = list(dict.fromkeys(violation.kind for violation in violations(problem, times, guesses[0])))
+    best: Relaxed | None = None
+    for kind in kinds:
+        found = _relaxed(problem, times, guesses, [kind])
+        if found is not None and (best is None or found.worst.relative < best.worst.relative):
+            best = found
+        if best is not None and best.feasible:
+            return best
+    if best is None and len(kinds) > 1:
+        return _relaxed(problem, times, guesses, kinds)
+    return best
+
+
+def _relaxed(problem: Problem, times: Array, guesses: list[Array], kinds: list[str]) -> Relaxed | None:
+    best: Relaxed | None = None
     for guess in guesses:
-        q, outcome, _ = Transcription(problem, times, guess, elastic=True).solve(tolerance=1e-6, max_iterations=300)
+        q, outcome, _ = Transcription(problem, times, guess, elastic=kinds).solve(tolerance=1e-6, max_iterations=150)
         gap = np.abs(problem.task.value(q) - problem.reference.position(times)).max()
         if not outcome.converged or gap > 1e-6:
             continue
-        worst = max(violations(problem, times, q), key=lambda violation: violation.relative)
-        if best is None or worst.relative < best.relative:
-            best = worst
+        worst = max(
+            (violation for violation in violations(problem, times, q) if violation.kind in kinds),
+            key=lambda violation: violation.relative,
+        )
+        if best is None or worst.relative < best.worst.relative:
+            best = Relaxed(q, worst)
     return best

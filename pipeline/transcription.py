@@ -15,6 +15,7 @@ torque limits are bounds; velocity limits are bounds or linear rows; power limit
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
@@ -37,10 +38,11 @@ Block = NDArray[np.int_]
 class Transcription:
     """The program of `problem` on the knots `times` (N + 1,), scaled for a solve that starts at `guess` (N + 1, n).
 
-    elastic: every limit may be exceeded by the same fraction, and that fraction is what is minimised instead.
+    elastic: kinds of limits (position, velocity, torque, power) that may all be exceeded by the same fraction; that
+    fraction is then what is minimised.
     """
 
-    def __init__(self, problem: Problem, times: Array, guess: Array, *, elastic: bool = False) -> None:
+    def __init__(self, problem: Problem, times: Array, guess: Array, *, elastic: Collection[str] = ()) -> None:
         self.elastic = elastic
         self.problem, self.times, self.q_guess = problem, times, guess
         self.arm, self.objective, self.limits = problem.task.arm, problem.objective, problem.bounds
@@ -148,22 +150,22 @@ class Transcription:
         first = 1 if self.problem.boundary is Boundary.FIXED else 0
         if np.isfinite(limits.lower).any() or np.isfinite(limits.upper).any():
             low, high = (np.tile(POSITION_SCALE * bound, count + 1 - first) for bound in (limits.lower, limits.upper))
-            self._keep_within(low, high, self.y[first:].ravel(), (high - low) / 2)
+            self._keep_within("position", low, high, self.y[first:].ravel(), (high - low) / 2)
         if np.isfinite(limits.velocity).any():
             # Scaled so that a row's coefficients are of order one.
             size = np.abs(self.to_velocity).max(axis=(1, 2))
             bound = (limits.velocity / size[:, None]).ravel()
             rows = None if self.diagonal else sp.block_diag(list(self.to_velocity / size[:, None, None]))
-            self._keep_within(-bound, bound, self.w.ravel(), bound, rows)
+            self._keep_within("velocity", -bound, bound, self.w.ravel(), bound, rows)
         if np.isfinite(limits.torque).any():
             bound = (limits.torque * self.torque_scale[:, None]).ravel()
-            self._keep_within(-bound, bound, self.u.ravel(), bound)
+            self._keep_within("torque", -bound, bound, self.u.ravel(), bound)
         for joint in np.flatnonzero(np.isfinite(limits.power)):
             self._limit_power(int(joint), float(limits.power[joint]))
 
-    def _keep_within(self, low: Array, high: Array, unknowns: Any, slack: Array, rows: Any = None) -> None:
+    def _keep_within(self, kind: str, low: Array, high: Array, unknowns: Any, slack: Array, rows: Any = None) -> None:
         """low <= rows @ unknowns <= high; as bounds where it can be, and softened by excess * slack if elastic."""
-        if not self.elastic:
+        if kind not in self.elastic:
             if rows is None:
                 self.program.AddBoundingBoxConstraint(low, high, unknowns)
             else:
@@ -189,7 +191,7 @@ class Transcription:
             form[0, 1:] = form[1:, 0] = row[used] / (self.torque_scale[i] * power)
             unknowns = np.concatenate([[self.u[i, joint]], self.w[i, used]])
             indefinite = QuadraticConstraint.HessianType.kIndefinite
-            if not self.elastic:
+            if "power" not in self.elastic:
                 constraint = QuadraticConstraint(form, np.zeros(len(form)), -1.0, 1.0, indefinite)
                 self.program.AddConstraint(constraint, unknowns)
                 continue

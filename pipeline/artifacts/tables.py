@@ -250,7 +250,7 @@ def write_sweep(folder: Path) -> None:
         rows.append(
             [row["run"], "" if pd.isna(label) else label, row["status"], *cells, "" if pd.isna(message) else message]
         )
-    notes = table["published_note"].dropna().unique() if "published_note" in table else []
+    notes: Sequence[str] = table["published_note"].dropna().unique().tolist() if "published_note" in table else []
     text = "\n".join([f"# Sweep {folder.name}", "", *_table(rows), "", *(f"- {note}" for note in notes), ""])
     write_beside(folder / "sweep.md", lambda file: file.write_text(text, encoding="utf-8"))
     print(f"sweep table in {folder / 'sweep.md'}")

@@ -18,14 +18,16 @@ from pipeline.arrays import Array
 from pipeline.candidates import distinct, diverse, population, ranking, starting_points
 from pipeline.config import GlobalOptions
 from pipeline.costs import objective_values
-from pipeline.feasibility import least_violation
+from pipeline.feasibility import Relaxed, least_violation
 from pipeline.kinematics import wrap
 from pipeline.parallel import Workers
 from pipeline.problem import Objective, Problem, Progress, Solution, Status, Trajectory, no_progress
 from pipeline.transcription import Transcription
 
 TRACKING = 1e-8  # [m] what an optimum must keep at every knot
-ELASTIC_STARTS = 4  # from how many motions the least violation is sought when no motion is feasible
+ELASTIC_STARTS = 3  # from how many motions the least violation is sought when no motion is feasible
+FEWER = 12  # starts on a finer grid after none succeeded on the coarse one
+HOPELESS = 0.1  # relative violation on a coarse grid from which on finer ones are not tried
 
 
 @dataclass(frozen=True)
@@ -56,10 +58,19 @@ def solve(
 
     while True:
         starts = _optimise_starts(problem, grids[0], options, motions, workers, progress)
-        if any(start.converged for start in starts) or len(grids) == 1:
+        if any(start.converged for start in starts):
+            break
+        relaxed = _relaxed(problem, grids[0], motions)
+        if relaxed is not None and relaxed.feasible:
+            starts += workers.map(_optimise_start, (problem, grids[0], options), [relaxed.q])
+            if starts[-1].converged:
+                break
+        elif relaxed is not None and (relaxed.worst.relative > HOPELESS or len(grids) == 1):
+            return [_nothing(problem, Status.INFEASIBLE, relaxed.worst.sentence, log)]
+        if len(grids) == 1:
             break
         # A coarse grid can be infeasible where a finer one is not: its finite differences are other numbers.
-        motions, grids = CubicSpline(grids[0], motions, axis=1)(grids[1]), grids[1:]
+        motions, grids = CubicSpline(grids[0], motions[:FEWER], axis=1)(grids[1]), grids[1:]
     log["grids"] = [len(grid) - 1 for grid in grids]
     log["starts"] = [
         {"converged": start.converged, "cost": start.cost, "status": start.status, "solves": start.solves}
@@ -70,7 +81,7 @@ def solve(
     found = [(fine, coarse) for fine, coarse in zip(refined, basins, strict=True) if fine.converged and fine.continuous]
     log["jumping_optima"] = sum(fine.converged and not fine.continuous for fine in refined)
     if not found:
-        return [_nothing(problem, *_why(problem, grids[-1], starts, refined), log)]
+        return [_nothing(problem, Status.NOT_CONVERGED, _why(starts, refined), log)]
     ranked = [found[index] for index in _distinct([fine for fine, _ in found], options, problem)]
     solutions = []
     for rank, (fine, coarse) in enumerate(ranked):
@@ -215,17 +226,18 @@ def _nothing(problem: Problem, status: Status, message: str, log: dict[str, Any]
     return Solution("global", Trajectory(problem.times, motion), status, message, statistics=log)
 
 
-def _why(problem: Problem, times: Array, starts: list[Optimum], refined: list[Optimum]) -> tuple[Status, str]:
-    """Nothing was found: the limit that cannot be met and the least violation found, or the solver's own words."""
+def _relaxed(problem: Problem, times: Array, motions: Array) -> Relaxed | None:
+    if not problem.bounds.any:
+        return None
+    return least_violation(problem, times, list(motions[:ELASTIC_STARTS]))
+
+
+def _why(starts: list[Optimum], refined: list[Optimum]) -> str:
+    """Why there is no optimum although there are starts, in the solver's own words."""
     if any(start.converged for start in starts):
         words = "; ".join(
             sorted({optimum.status if not optimum.converged else "jumps between branches" for optimum in refined})
         )
-        return Status.NOT_CONVERGED, f"{len(refined)} optima of the coarse grid were lost on a finer one ({words})"
+        return f"{len(refined)} optima of the coarse grid were lost on a finer one ({words})"
     words = Counter(start.status for start in starts).most_common(1)[0][0]
-    if problem.bounds.any:
-        nearest = sorted(starts, key=lambda start: start.cost)[:ELASTIC_STARTS]
-        violation = least_violation(problem, times, [start.q for start in nearest])
-        if violation is not None and violation.relative > 1e-4:
-            return Status.INFEASIBLE, violation.sentence
-    return Status.NOT_CONVERGED, f"none of {len(starts)} starts converged (most often: {words})"
+    return f"none of {len(starts)} starts converged (most often: {words})"
