@@ -28,7 +28,8 @@ from pipeline.schema import (
     text,
 )
 
-METHODS = ("lsv", "pmke", "global", "dynamic_programming", "calculus_of_variations")
+METHODS = ("lsv", "pmke", "global", "dynamic_programming", "calculus_of_variations", "pareto")
+INTEGRALS = ("kinetic_energy", "torque")
 DEFAULT_METHODS = ("lsv", "pmke", "global")
 
 
@@ -208,6 +209,18 @@ class CandidateStudyConfig:
 
 
 @dataclass(frozen=True)
+class ParetoOptions:
+    """Pareto front of two integrals: method `pareto`."""
+
+    method: str = choice("epsilon_constraint", "epsilon_constraint", "weighting")
+    objectives: list[str] = choices(INTEGRALS, *INTEGRALS)
+    steps: int = count(10, low=2)
+    rounds: int = count(3, low=0)
+    tolerance: float = number(1e-8, above=0)
+    max_iterations: int = count(200)
+
+
+@dataclass(frozen=True)
 class PublishedConfig:
     """Printed numbers that a run is compared against: data for the tables, never used in solving."""
 
@@ -233,6 +246,7 @@ class RunConfig:
     boundary: BoundaryConfig = part(BoundaryConfig)
     method: MethodConfig = part(MethodConfig)
     parallel: ParallelConfig = part(ParallelConfig)
+    pareto: ParetoOptions = part(ParetoOptions)
     candidate_study: CandidateStudyConfig = part(CandidateStudyConfig)
     published: PublishedConfig = part(PublishedConfig)
 

@@ -7,11 +7,13 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from pipeline import candidate_study, certificate, validation
+from pipeline import candidate_study, certificate, front, validation
 from pipeline.config import RunConfig
 from pipeline.costs import objective_values
 from pipeline.evaluation import Evaluation
 from pipeline.problem import Problem
+
+FEW = 4  # motions between the extremes of a front that the figures show
 
 
 @dataclass(frozen=True)
@@ -21,6 +23,16 @@ class Extras:
     certificate: dict[str, float] | None = None
     validation: pd.DataFrame | None = None
     study: candidate_study.Study | None = None
+    front: pd.DataFrame | None = None
+
+    def shown(self, evaluations: Sequence[Evaluation]) -> list[Evaluation]:
+        """The motions that figures show one by one: all of them, but of a front its extremes, its knee and a few between."""
+        if self.front is None:
+            return list(evaluations)
+        good = self.front[self.front["status"] == "optimal"]
+        chosen = set(good[good["extreme"] | good["knee"]]["point"])
+        chosen |= set(good["point"].iloc[:: max(1, len(good) // FEW)])
+        return [e for e in evaluations if e.method != "pareto" or e.solution.optimum in chosen]
 
 
 def compute(problem: Problem, config: RunConfig, evaluations: Sequence[Evaluation]) -> Extras:
@@ -30,6 +42,7 @@ def compute(problem: Problem, config: RunConfig, evaluations: Sequence[Evaluatio
     return Extras(
         certificate=None if pair is None else certificate.certify(problem, *pair),
         validation=validation.table(problem, evaluations) if methods >= {"global", "calculus_of_variations"} else None,
+        front=front.table(evaluations),
         study=_study(problem, config, evaluations) if config.candidate_study.run else None,
     )
 

@@ -38,6 +38,17 @@ class Objective:
     torque: float = 0.0
 
 
+INTEGRALS = ("kinetic_energy", "torque")
+
+
+@dataclass(frozen=True)
+class IntegralBounds:
+    """Upper bounds on the same integrals; infinite where there is none."""
+
+    kinetic_energy: float = np.inf
+    torque: float = np.inf
+
+
 @dataclass(frozen=True)
 class Limits:
     """Bounds (n,) on joint motion; infinite where there are none. Units: rad, rad/s, N m, W."""
@@ -84,6 +95,7 @@ class Problem:
     objective: Objective = field(default_factory=Objective)
     limits: Limits | None = None
     boundary: Boundary = Boundary.FIXED
+    integral_bounds: IntegralBounds = field(default_factory=IntegralBounds)
 
     @property
     def bounds(self) -> Limits:

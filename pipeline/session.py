@@ -28,7 +28,7 @@ class Session(Callback):
 
     def on_run_start(self, config: DictConfig, **_: Any) -> None:
         """Refuse bad input before Hydra makes the output folder."""
-        from pipeline.run import prepare
+        from pipeline.prepare import prepare
 
         try:
             prepare(checked(config))

@@ -10,12 +10,13 @@ with backward differences throughout: qdd_i = (qd_i - qd_(i-1)) / dt_i (PMKE pap
 For the kinetic energy, S_i = sqrt(dt_i / C) L_i' with M(q_guess,i) = L_i L_i' and C the cost of the guess: divided by
 C, the objective then has nearly the identity for a Hessian in w, which is what IPOPT's limited-memory approximation
 starts from. The squared torques are a plain |u|^2. Positions scaled small do not weigh in that start. Position and
-torque limits are bounds; velocity limits are bounds or linear rows; power limits are bilinear rows.
+torque limits are bounds; velocity limits are bounds or linear rows; power limits are bilinear rows. A bounded
+integral (epsilon-constraint, Global paper eqs (21), (22)) is a row over sums of a few knots each.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from typing import Any
 
 import numpy as np
@@ -27,7 +28,7 @@ from pipeline import ipopt
 from pipeline.arrays import Array
 from pipeline.costs import Costs, integrals, velocities
 from pipeline.differentiable import DifferentiableConstraint, DifferentiableCost
-from pipeline.problem import Boundary, Problem
+from pipeline.problem import INTEGRALS, Boundary, Problem
 
 POSITION_SCALE = 0.03
 VELOCITY_SCALE = 0.03  # for objectives without kinetic energy: small, like the positions
@@ -49,10 +50,14 @@ class Transcription:
         self.n, self.intervals = self.arm.n, len(times) - 1
         self.dt = np.diff(times)
         self.x_ref = problem.reference.position(times)
-        self.lifts_torque = self.objective.torque > 0 or bool(
+        self.integral_bounds = problem.integral_bounds
+        self.counts_energy = self.objective.kinetic_energy > 0 or np.isfinite(self.integral_bounds.kinetic_energy)
+        self.counts_torque = self.objective.torque > 0 or np.isfinite(self.integral_bounds.torque)
+        self.lifts_torque = self.counts_torque or bool(
             np.isfinite(self.limits.torque).any() or np.isfinite(self.limits.power).any()
         )
         self._tracking_rows: list[DifferentiableConstraint] = []
+        self._sums: list[tuple[str, Any]] = []
         self._scale()
 
         self.program = MathematicalProgram()
@@ -82,6 +87,8 @@ class Transcription:
         if self.objective.torque > 0 and not elastic:
             flat = self.u.ravel()
             self.program.AddQuadraticCost(2 * np.eye(len(flat)), np.zeros(len(flat)), flat, is_convex=True)
+        if not elastic:
+            self._bound_integrals()
 
     def solve(self, **options: Any) -> tuple[Array, ipopt.Outcome, int]:
         """Solve from the guess: positions (N + 1, n) [rad], IPOPT's outcome, its iterations."""
@@ -92,6 +99,8 @@ class Transcription:
             parts.append(self.torque_scale[:, None] * self.tau_guess)
         if self.elastic:
             parts.append(np.ones(1))
+        for _, sums in self._sums:
+            parts.append(np.full(len(sums), 1.0 / len(sums)))
         outcome = ipopt.solve(self.program, np.concatenate([part.ravel() for part in parts]), **options)
         q = outcome.x[: self.y.size].reshape(self.y.shape) / POSITION_SCALE
         return q, outcome, self._tracking_rows[0].iterations
@@ -107,9 +116,12 @@ class Transcription:
         self.tau_guess = costs.tau[1:]
         weighted = self.objective.kinetic_energy * costs.kinetic_energy + self.objective.torque * costs.torque
         self.cost = weighted if weighted > 0 else 1.0
-        if self.objective.kinetic_energy > 0:
+        self.energy = costs.kinetic_energy if costs.kinetic_energy > 0 else 1.0
+        if self.counts_energy:
+            # Half |w|^2 is the energy's share of the cost, or its ratio to the guess's where it is only bounded.
+            share = self.objective.kinetic_energy / self.cost if self.objective.kinetic_energy > 0 else 1 / self.energy
             root = np.linalg.cholesky(self.arm.mass_matrix(q[1:]))
-            factor = np.sqrt(self.cost / self.objective.kinetic_energy / dt)[:, None, None]
+            factor = 1 / np.sqrt(share * dt)[:, None, None]
             self.to_velocity = factor * np.linalg.inv(root).transpose(0, 2, 1)  # qd_i = to_velocity_i w_i
             self.diagonal = False
         else:
@@ -117,6 +129,8 @@ class Transcription:
             self.diagonal = True
         if self.objective.torque > 0:
             self.torque_scale = np.sqrt(self.objective.torque * dt / self.cost)
+        elif self.counts_torque:
+            self.torque_scale = np.sqrt(dt / (costs.torque if costs.torque > 0 else 1.0))
         else:
             size = float(np.sqrt(np.mean(self.tau_guess**2))) or 1.0
             self.torque_scale = np.full(self.intervals, 0.1 / (size * np.sqrt(self.intervals)))
@@ -203,9 +217,9 @@ class Transcription:
 
     # --- nonlinear terms, KNOTS_PER_BINDING knots each ----------------------------------------------------------
 
-    def _add_kinetic_energy(self, block: Block) -> None:
+    def _energy(self, block: Block, weight: Array) -> Callable[[Array], tuple[float, Array]]:
+        """The sum of weight_i T_i over a block, by (y, w)."""
         shape, to_velocity = (len(block), self.n), self.to_velocity[block]
-        weight = self.objective.kinetic_energy * self.dt[block] / self.cost
         split = len(block) * self.n
 
         def energy(x: Array) -> tuple[float, Array]:
@@ -216,8 +230,48 @@ class Transcription:
             by_w = (by_velocity[:, None, :] @ to_velocity)[:, 0] * weight[:, None]
             return float(value @ weight), np.concatenate([by_y.ravel(), by_w.ravel()])
 
+        return energy
+
+    def _add_kinetic_energy(self, block: Block) -> None:
         unknowns = np.concatenate([self.y[block + 1].ravel(), self.w[block].ravel()])
+        energy = self._energy(block, self.objective.kinetic_energy * self.dt[block] / self.cost)
         self.program.AddCost(DifferentiableCost(energy), vars=unknowns)
+
+    def _bound_integrals(self) -> None:
+        """Sums of a few knots are unknowns of their own, bounded together: the rows stay sparse."""
+        blocks = _blocks(0, self.intervals)
+        for kind in INTEGRALS:
+            bound = getattr(self.integral_bounds, kind)
+            if not np.isfinite(bound):
+                continue
+            sums = self.program.NewContinuousVariables(len(blocks), f"{kind}_sums")
+            for block, total in zip(blocks, sums, strict=True):
+                if kind == "kinetic_energy":
+                    self._bound_energy(block, total, bound)
+                else:
+                    self._bound_torque(block, total, bound)
+            # Scaled by the bound: the sums add up to at most 1.
+            self.program.AddLinearConstraint(np.ones((1, len(sums))), [-np.inf], [1.0], sums)
+            self._sums.append((kind, sums))
+
+    def _bound_energy(self, block: Block, total: Any, bound: float) -> None:
+        energy = self._energy(block, self.dt[block] / bound)
+
+        def excess(x: Array) -> tuple[Array, Array]:
+            value, gradient = energy(x[:-1])
+            return np.array([value - x[-1]]), np.append(gradient, -1.0)[None]
+
+        unknowns = np.concatenate([self.y[block + 1].ravel(), self.w[block].ravel(), [total]])
+        self.program.AddConstraint(DifferentiableConstraint(excess), lb=[-np.inf], ub=[0.0], vars=unknowns)
+
+    def _bound_torque(self, block: Block, total: Any, bound: float) -> None:
+        # u = s tau, and the integral is the sum of tau'tau dt.
+        weight = np.repeat(self.dt[block] / (self.torque_scale[block] ** 2 * bound), self.n)
+        form = np.diag(np.append(2 * weight, 0.0))
+        linear = np.append(np.zeros(len(weight)), -1.0)
+        convex = QuadraticConstraint.HessianType.kPositiveSemidefinite
+        constraint = QuadraticConstraint(form, linear, -np.inf, 0.0, convex)
+        self.program.AddConstraint(constraint, np.append(self.u[block].ravel(), total))
 
     def _add_tracking(self, knots: Block) -> None:
         """x(q_i) = x_ref,i."""

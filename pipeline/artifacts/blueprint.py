@@ -14,6 +14,7 @@ from pipeline.artifacts import style
 
 BACKGROUND = (255, 255, 255)  # the colours of style.py are made for white
 GRID = (120, 120, 120, 60)
+MANY = 8  # motions that can be told apart in one view
 ENERGIES = {
     "energy_integral": "Kinetic-energy integral [J s]",
     "kinetic_energy": "Kinetic energy T [J]",
@@ -36,16 +37,22 @@ def build(
     revolute: Sequence[bool],
     planar: bool,
     ranges: Mapping[str, tuple[float, float]],
+    picture: bool = False,
 ) -> rrb.Blueprint:
     """The layout for the motions `labels`; the cameras take in `points` (P, 3) [m], all of the scene.
 
     revolute: (n,) which joints turn; it decides on the units in the titles.
     ranges: the lowest and highest value to show of an entity such as `kinetic_energy`; others show all there is.
+    picture: whether there is one, to be shown in the first tab. With more than MANY motions the first and the last are
+    shown, and the panel on the left is open, where the eye beside each motion shows or hides it.
     """
-    arms = _space(labels, points, planar)
+    hidden = labels[1:-1] if len(labels) > MANY else []
+    arms = _space(labels, points, planar, hidden)
     if planar:
-        arms = rrb.Tabs(_plane(labels, points), arms, name="Arms")
+        arms = rrb.Tabs(_plane(labels, points, hidden), arms, name="Arms")
     summary = rrb.TextDocumentView(origin="/summary", name="Summary")
+    if picture:
+        summary = rrb.Tabs(rrb.Spatial2DView(origin="/picture", name="Front"), summary)
     compared = {
         entity: _compare(labels, entity, title, ranges.get(entity)) for entity, title in (ENERGIES | CHECKS).items()
     }
@@ -60,13 +67,17 @@ def build(
         ),
         rrb.TimePanel(state="collapsed", timeline="time", play_state="paused", loop_mode="all"),
         rrb.SelectionPanel(state="hidden"),
-        rrb.BlueprintPanel(state="hidden"),
+        rrb.BlueprintPanel(state="expanded" if hidden else "hidden"),
         auto_views=False,
         auto_layout=False,
     )
 
 
-def _space(labels: Sequence[str], points: Array, planar: bool) -> Any:
+def _hide(hidden: Sequence[str], prefix: str = "") -> dict[str, Any]:
+    return {f"{prefix}/{slug(label)}": rrb.EntityBehavior(visible=False) for label in hidden}
+
+
+def _space(labels: Sequence[str], points: Array, planar: bool, hidden: Sequence[str]) -> Any:
     """A 3-D view of everything; a planar arm is seen from steeply above, others from the side."""
     center = (points.min(axis=0) + points.max(axis=0)) / 2
     size = max(float(np.linalg.norm(points - center, axis=1).max()), 1e-6)
@@ -76,13 +87,14 @@ def _space(labels: Sequence[str], points: Array, planar: bool) -> Any:
         origin="/",
         contents=["/reference", *(f"/{slug(label)}/**" for label in labels)],
         name="Arms (3-D)",
+        overrides=_hide(hidden),
         background=BACKGROUND,
         line_grid=rrb.LineGrid3D(visible=True, spacing=10.0 ** np.floor(np.log10(size)) / 2, color=GRID),
         eye_controls=rrb.EyeControls3D(position=eye, look_target=center, eye_up=(0.0, 0.0, 1.0)),
     )
 
 
-def _plane(labels: Sequence[str], points: Array) -> Any:
+def _plane(labels: Sequence[str], points: Array, hidden: Sequence[str]) -> Any:
     """The view from above. Rerun's 2-D views have y pointing down, so everything in `/planar` is logged with -y."""
     low, high = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
     margin = 0.08 * max(float((high - low).max()), 1e-6)
@@ -90,6 +102,7 @@ def _plane(labels: Sequence[str], points: Array) -> Any:
         origin="/planar",
         contents=["/planar/reference", *(f"/planar/{slug(label)}/**" for label in labels)],
         name="Arms (plane)",
+        overrides=_hide(hidden, "/planar"),
         background=BACKGROUND,
         visual_bounds=rrb.VisualBounds2D(
             x_range=(low[0] - margin, high[0] + margin), y_range=(-high[1] - margin, -low[1] + margin)

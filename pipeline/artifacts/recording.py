@@ -44,20 +44,24 @@ def write(
     name: str,
     summary: str,
     properties: Mapping[str, Any],
+    picture: Path | None = None,
 ) -> None:
     """Write the recording `file` (.rrd) of all `evaluations`, or raise and leave nothing behind.
 
     summary: Markdown, shown beside the plots. properties: facts of the run, stored as the recording's property `run`.
+    picture: a PNG to show first, such as the Pareto front (2-D views have no axes of their own).
     """
     temporary = file.with_name(f"{file.name}.tmp")
     try:
         with _strict(), rr.RecordingStream("selfmotion") as recording:
-            recording.save(temporary, default_blueprint=_layout(problem, evaluations))
+            recording.save(temporary, default_blueprint=_layout(problem, evaluations, picture is not None))
             recording.send_recording_name(name)
             if facts := _facts(properties):
                 recording.send_property("run", facts)
             document = rr.TextDocument(summary, media_type=rr.MediaType.MARKDOWN)
             recording.log("summary", document, static=True)
+            if picture is not None:
+                recording.log("picture", rr.EncodedImage(path=picture), static=True)
             _send_reference(recording, problem)
             for evaluation in evaluations:
                 _send_series(recording, problem, evaluation)
@@ -93,12 +97,12 @@ def _strict() -> Iterator[None]:
         rr.set_strict_mode(before)
 
 
-def _layout(problem: Problem, evaluations: Sequence[Evaluation]) -> Any:
+def _layout(problem: Problem, evaluations: Sequence[Evaluation], picture: bool) -> Any:
     points = [np.zeros((1, 3)), _reference(problem)]  # the arm stands at the origin
     points += [evaluation.skeleton[_finite(evaluation)].reshape(-1, 3) for evaluation in evaluations]
     labels = [evaluation.label for evaluation in evaluations]
     revolute = problem.task.arm.description.revolute.tolist()
-    return blueprint.build(labels, np.concatenate(points), revolute, _planar(problem), _ranges(evaluations))
+    return blueprint.build(labels, np.concatenate(points), revolute, _planar(problem), _ranges(evaluations), picture)
 
 
 def _ranges(evaluations: Sequence[Evaluation]) -> dict[str, tuple[float, float]]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import colorsys
+
 METHOD_COLORS = {
     "lsv": "#D9601A",
     "pmke": "#2B6CB0",
@@ -9,6 +11,7 @@ METHOD_COLORS = {
     "calculus_of_variations": "#6B46C1",
     "dynamic_programming": "#5A6472",
     "pontryagin": "#C53030",
+    "pareto": "#2F855A",
 }
 METHOD_NAMES = {
     "lsv": "LSV",
@@ -17,10 +20,12 @@ METHOD_NAMES = {
     "calculus_of_variations": "Calculus of variations",
     "dynamic_programming": "Dynamic programming",
     "pontryagin": "Pontryagin",
+    "pareto": "Pareto point",
 }
 # Joints 1, 2, 3 are blue, red and yellow in the papers; the others keep apart from them and from one another.
 JOINT_COLORS = ("#1F5FBF", "#C62828", "#D9A400", "#2E8B57", "#7B3FA0", "#00838F", "#8D5524", "#D81B7A", "#5A6472")
 UNKNOWN = "#44403C"
+FRONT = 19  # points after the first over which a front's hues run from blue to red
 
 
 def _split(label: str) -> tuple[str, int]:
@@ -30,8 +35,11 @@ def _split(label: str) -> tuple[str, int]:
 
 
 def color(label: str) -> str:
-    """The colour `#RRGGBB` of a motion: its method's, and lighter for every further optimum."""
+    """The colour `#RRGGBB` of a motion: its method's, lighter for every further optimum; a front runs through hues."""
     method, optimum = _split(label)
+    if method == "pareto":
+        hue = 0.62 - 0.62 * min(1.0, (optimum - 1) / FRONT)
+        return "#" + "".join(f"{round(255 * channel):02X}" for channel in colorsys.hsv_to_rgb(hue, 0.75, 0.75))
     base = METHOD_COLORS.get(method, UNKNOWN)
     keep = max(0.75 ** (optimum - 1), 0.35)
     channels = (int(base[i : i + 2], 16) for i in (1, 3, 5))
@@ -41,7 +49,8 @@ def color(label: str) -> str:
 def name(label: str) -> str:
     """The name of a motion for legends and titles: `Global optimum 2`."""
     method, optimum = _split(label)
-    return METHOD_NAMES.get(method, method) + (f" {optimum}" if optimum > 1 else "")
+    numbered = optimum > 1 or method == "pareto"
+    return METHOD_NAMES.get(method, method) + (f" {optimum}" if numbered else "")
 
 
 def joint_color(joint: int) -> str:

@@ -18,6 +18,7 @@ from pipeline.config import PublishedConfig, RunConfig
 from pipeline.evaluation import Evaluation
 from pipeline.extras import Extras
 from pipeline.files import write_beside
+from pipeline.front import hypervolume
 from pipeline.problem import Problem, Solution
 
 UNITS = {
@@ -113,6 +114,11 @@ def markdown(
         lines += ["", f"Certificate: {certificate.sentence(extras.certificate, len(grid.time) - 1)}."]
     if extras.validation is not None:
         lines += ["", "## Planner and calculus of variations", "", *_table(_cells(extras.validation))]
+    if extras.front is not None:
+        good = extras.front[extras.front["status"] == "optimal"]
+        share = hypervolume(good[extras.front.columns[2:4]].to_numpy())
+        lines += ["", "## Pareto front", "", f"Hypervolume {share:.4f} of the rectangle between the extremes.", ""]
+        lines += _table(_cells(extras.front.drop(columns=["solver_status"])))
     if extras.study is not None:
         study = extras.study
         lines += [
@@ -160,8 +166,16 @@ def _table(rows: list[list[str]]) -> list[str]:
 def _cells(table: pd.DataFrame) -> list[list[str]]:
     rows = [[column.replace("_", " ") for column in table.columns]]
     for record in table.to_numpy():
-        rows.append(["" if pd.isna(cell) else cell if isinstance(cell, str) else f"{cell:.5g}" for cell in record])
+        rows.append([_cell(value) for value in record])
     return rows
+
+
+def _cell(value: Any) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else ""
+    if isinstance(value, str):
+        return value
+    return "" if pd.isna(value) or np.isinf(value) else f"{value:.5g}"
 
 
 def write(folder: Path, evaluations: Sequence[Evaluation], table: pd.DataFrame, text: str, extras: Extras) -> None:
@@ -169,6 +183,9 @@ def write(folder: Path, evaluations: Sequence[Evaluation], table: pd.DataFrame, 
     if extras.validation is not None:
         validation = extras.validation
         write_beside(folder / "validation.csv", lambda file: validation.to_csv(file, index=False))
+    if extras.front is not None:
+        front = extras.front
+        write_beside(folder / "front.csv", lambda file: front.to_csv(file, index=False))
     if extras.study is not None:
         curve = pd.DataFrame({"candidates": extras.study.count, "distance": extras.study.distance})
         write_beside(folder / "candidate_study.csv", lambda file: curve.to_csv(file, index=False))

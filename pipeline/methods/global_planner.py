@@ -188,10 +188,10 @@ def _refine(context: tuple[Problem, list[Array], GlobalOptions], start: Optimum)
     for coarse, fine in pairwise(grids):
         optimum = _optimise(problem, fine, CubicSpline(coarse, optimum.q)(fine), options)
         solves += optimum.solves
-    return replace(optimum, solves=solves, continuous=_stays_on_path(problem, grids[-1], optimum.q))
+    return replace(optimum, solves=solves, continuous=stays_on_path(problem, grids[-1], optimum.q))
 
 
-def _stays_on_path(problem: Problem, times: Array, q: Array) -> bool:
+def stays_on_path(problem: Problem, times: Array, q: Array) -> bool:
     """Whether the cubic spline through the knots follows the path between them, to 1 % of its length.
 
     A finite-difference program also has optima that jump to another branch of the manifold within one interval.

@@ -1,0 +1,218 @@
+"""Pareto fronts of two integrals by the epsilon-constraint method (Global paper Section 4.3), or by weighting.
+
+The extremes are the optima of the global planner for each objective alone. Then, in k equal steps of each interval, one
+integral is minimised with the other bounded, in both directions (eqs (21), (22); (21) bounds the torques, (22) the
+energy). Every point starts from all optima known so far and then from its neighbours on both sides, until no point
+improves, so that a front that jumps between classes of paths is followed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy.cluster.hierarchy import fcluster, linkage
+from scipy.spatial.distance import squareform
+
+from pipeline.arrays import Array
+from pipeline.candidates import path_distance
+from pipeline.config import GlobalOptions, ParetoOptions
+from pipeline.costs import integrals
+from pipeline.methods import global_planner
+from pipeline.methods.global_planner import TRACKING
+from pipeline.parallel import Workers
+from pipeline.problem import IntegralBounds, Objective, Problem, Progress, Solution, Status, Trajectory, no_progress
+from pipeline.transcription import Transcription
+
+SAME_CLASS = 0.6  # [rad] neighbouring points of one class of paths differ by less at every knot
+IMPROVED = 1e-7  # relative: a smaller gain is none
+
+
+@dataclass(frozen=True)
+class Point:
+    """One program of the front: minimise `weights`, with the integral `bounded` at most `bound`; its best motion so far."""
+
+    direction: str  # minimise:<integral>, or weights
+    weights: tuple[float, float]
+    bounded: str | None
+    bound: float
+    q: Array | None = None
+    values: tuple[float, float] = (np.inf, np.inf)
+    converged: bool = False
+    status: str = "not solved"
+
+    @property
+    def cost(self) -> float:
+        return self.weights[0] * self.values[0] + self.weights[1] * self.values[1]
+
+
+def solve(
+    problem: Problem,
+    options: ParetoOptions,
+    planner: GlobalOptions,
+    seed: int = 1,
+    workers: Workers = Workers(),
+    progress: Progress = no_progress,
+) -> list[Solution]:
+    """The front's motions, from the first extreme to the second. The first's statistics hold `front`, a row per point."""
+    first, second = options.objectives
+    known: list[Array] = []
+    extremes: list[Point] = []
+    for own in (first, second):
+        alone = replace(problem, objective=_only(own))
+        optima = global_planner.solve(alone, planner, seed, workers, progress)
+        if optima[0].status is not Status.SOLVED:
+            message = f"the extreme of {own} was not found: {optima[0].message or optima[0].status.value}"
+            return [replace(optima[0], method="pareto", message=message)]
+        known += [optimum.trajectory.q for optimum in optima]
+        weights = (1.0, 0.0) if own == first else (0.0, 1.0)
+        q = optima[0].trajectory.q
+        extremes.append(
+            Point(f"minimise:{own}", weights, None, np.inf, q, _values(problem, options, q), True, "success")
+        )
+    best = np.array([extremes[0].values[0], extremes[1].values[1]])
+    worst = np.array([extremes[1].values[0], extremes[0].values[1]])
+    if not np.all(worst - best > IMPROVED * np.abs(best)):
+        return _report(problem, extremes, options)  # one motion is best in both: there is nothing to trade
+    between = replace(problem, objective=_weighted(options, 1 / (worst - best)))
+    known += [
+        s.trajectory.q
+        for s in global_planner.solve(between, planner, seed, workers, progress)
+        if s.status is Status.SOLVED
+    ]
+
+    points = _points(options, best, worst)
+    points = _try(problem, options, points, [(i, q) for i in range(len(points)) for q in known], workers, progress)
+    for _ in range(options.rounds):
+        pairs = _neighbours(points)
+        improved = _try(problem, options, points, pairs, workers, progress)
+        gained = any(
+            new.cost < old.cost * (1 - IMPROVED) or new.converged > old.converged
+            for new, old in zip(improved, points, strict=True)
+        )
+        points = improved
+        if not gained:
+            break
+    return _report(problem, [extremes[0], *points, extremes[1]], options)
+
+
+def _points(options: ParetoOptions, best: Array, worst: Array) -> list[Point]:
+    """The programs between the extremes; the last step of each direction is the extreme itself."""
+    first, second = options.objectives
+    fraction = np.arange(1, options.steps) / options.steps
+    if options.method == "weighting":
+        scale = 1 / (worst - best)
+        return [
+            Point("weights", ((1 - f) * scale[0], f * scale[1]), None, np.inf)
+            for f in np.arange(1, 2 * options.steps - 1) / (2 * options.steps - 1)
+        ]
+    down = [
+        Point(f"minimise:{first}", (1.0, 0.0), second, float(best[1] + f * (worst[1] - best[1])))
+        for f in fraction[::-1]
+    ]
+    up = [Point(f"minimise:{second}", (0.0, 1.0), first, float(best[0] + f * (worst[0] - best[0]))) for f in fraction]
+    return down + up
+
+
+def _neighbours(points: Sequence[Point]) -> list[tuple[int, Array]]:
+    """Each point with the motions of the points before and after it, by the value of the first integral."""
+    solved = sorted((i for i, point in enumerate(points) if point.converged), key=lambda i: points[i].values[0])
+    pairs = []
+    for rank, i in enumerate(solved):
+        pairs += [(i, points[solved[other]].q) for other in (rank - 1, rank + 1) if 0 <= other < len(solved)]
+    open_points = [i for i, point in enumerate(points) if not point.converged]
+    pairs += [(i, points[j].q) for i in open_points for j in solved]
+    return [(i, q) for i, q in pairs if q is not None]
+
+
+def _try(
+    problem: Problem,
+    options: ParetoOptions,
+    points: list[Point],
+    pairs: list[tuple[int, Array]],
+    workers: Workers,
+    progress: Progress,
+) -> list[Point]:
+    """Solve point i from motion q for all pairs (i, q); keep the better motion of each."""
+    best = list(points)
+
+    def done(count: int, found: Point) -> None:
+        progress(count, len(pairs), found.cost)
+
+    items = [(replace(points[i], q=None, values=(np.inf, np.inf)), q) for i, q in pairs]
+    for (i, _), found in zip(pairs, workers.map(_solve_point, (problem, options), items, done), strict=True):
+        better = found.converged and (not best[i].converged or found.cost < best[i].cost * (1 - 1e-12))
+        if better or best[i].q is None:
+            best[i] = found
+    return best
+
+
+def _solve_point(context: tuple[Problem, ParetoOptions], item: tuple[Point, Array]) -> Point:
+    (problem, options), (point, guess) = context, item
+    bounds = IntegralBounds() if point.bounded is None else IntegralBounds(**{point.bounded: point.bound})
+    objective = Objective(**dict(zip(options.objectives, point.weights, strict=True)))
+    stated = replace(problem, objective=objective, integral_bounds=bounds)
+    q, outcome, _ = Transcription(stated, problem.times, guess).solve(
+        tolerance=options.tolerance, max_iterations=options.max_iterations
+    )
+    converged = outcome.converged and global_planner.stays_on_path(problem, problem.times, q)
+    return replace(point, q=q, values=_values(problem, options, q), converged=converged, status=outcome.status)
+
+
+def _values(problem: Problem, options: ParetoOptions, q: Array) -> tuple[float, float]:
+    costs = integrals(problem, problem.times, q)
+    first, second = (float(getattr(costs, name)) for name in options.objectives)
+    return first, second
+
+
+def _only(name: str) -> Objective:
+    return Objective(**{"kinetic_energy": 0.0, "torque": 0.0, name: 1.0})
+
+
+def _weighted(options: ParetoOptions, weights: Array) -> Objective:
+    return Objective(**dict(zip(options.objectives, (weights / weights.sum()).tolist(), strict=True)))
+
+
+def _report(problem: Problem, points: Sequence[Point], options: ParetoOptions) -> list[Solution]:
+    order = sorted(range(len(points)), key=lambda i: (not points[i].converged, points[i].values))
+    solved = [i for i in order if points[i].converged]
+    classes = _classes(problem, [q for i in solved if (q := points[i].q) is not None])
+    rows: list[dict[str, Any]] = []
+    solutions = []
+    for rank, i in enumerate(order):
+        point = points[i]
+        row = {
+            "point": rank + 1,
+            "direction": point.direction,
+            "bounded": point.bounded or "",
+            "bound": point.bound,
+            "solver_status": point.status,
+            "path_class": classes[rank] if point.converged else 0,
+            "extreme": point.bounded is None and point.direction != "weights",
+        }
+        rows.append(row)
+        if point.converged and point.q is not None:
+            solutions.append(
+                Solution(
+                    "pareto",
+                    Trajectory(problem.times, point.q),
+                    Status.SOLVED,
+                    optimum=rank + 1,
+                    tracking_tolerance=TRACKING,
+                )
+            )
+    solutions[0].statistics.update({"front": rows, "objectives": list(options.objectives)})
+    return solutions
+
+
+def _classes(problem: Problem, motions: Sequence[Array]) -> list[int]:
+    """Classes of paths (1, 2, ... in the order of the front): motions linked by steps smaller than SAME_CLASS."""
+    if len(motions) < 2:
+        return [1] * len(motions)
+    revolute = problem.task.arm.description.revolute
+    distance = np.array([[path_distance(a, b, revolute) for b in motions] for a in motions])
+    label = fcluster(linkage(squareform(distance, checks=False), "single"), SAME_CLASS, "distance")
+    number = {name: rank + 1 for rank, name in enumerate(dict.fromkeys(label.tolist()))}
+    return [number[name] for name in label.tolist()]

@@ -1,0 +1,188 @@
+"""From a configuration to the problem that it states; bad input ends here, in one line."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path as File
+from typing import Any
+
+import numpy as np
+
+from pipeline import config as schema
+from pipeline.arm import Arm
+from pipeline.arrays import Array
+from pipeline.errors import ConfigError, PathError, RobotError
+from pipeline.kinematics import place, project
+from pipeline.path import (
+    ConstantSpeed,
+    Geometry,
+    Line,
+    Quintic,
+    RaisedCosine,
+    Reference,
+    Spline,
+    Timing,
+    circle,
+    direction_vector,
+    read_waypoints,
+)
+from pipeline.problem import Boundary, Limits, Objective, Problem
+from pipeline.task import PositionTask
+
+PROJECT = File(__file__).resolve().parent.parent
+TIMINGS: dict[str, Callable[[float], Timing]] = {
+    "raised_cosine": RaisedCosine,
+    "constant_speed": ConstantSpeed,
+    "quintic": Quintic,
+}
+
+
+def prepare(config: schema.RunConfig) -> Problem:
+    """The problem that a configuration states; raises InputError, one line, if it cannot be posed."""
+    robot = config.robot
+    arm = Arm.from_urdf(
+        _find(robot.urdf), robot.end_effector, base=robot.base, offset=robot.offset, locked=robot.locked
+    )
+    task = PositionTask(arm, tuple(robot.task))
+    if len(robot.q_init) != arm.n:
+        names = ", ".join(arm.description.joints)
+        raise RobotError(f"robot.q_init has {len(robot.q_init)} values, the arm has {arm.n} moving joints ({names})")
+    q_init = np.array(robot.q_init)
+    geometry, q_init = _geometry(config.path, task, q_init)
+    reference = Reference(geometry, TIMINGS[config.timing.law](config.timing.duration))
+    problem = Problem(
+        task,
+        reference,
+        q_init,
+        _knots(config.timing),
+        objective=Objective(config.objective.kinetic_energy, config.objective.torque),
+        limits=_limits(config.limits, arm),
+        boundary=Boundary(config.boundary.kind),
+    )
+    _check(problem)
+    _require_reach(problem)
+    return problem
+
+
+def _knots(timing: schema.TimingConfig) -> Array:
+    """The grid (steps + 1,) [s]: even, or finer by the factors of `dense`."""
+    if not timing.dense:
+        return np.linspace(0.0, timing.duration, timing.steps + 1)
+    fine = np.linspace(0.0, timing.duration, 20 * timing.steps + 1)
+    density = np.ones(len(fine) - 1)
+    middle = (fine[1:] + fine[:-1]) / 2
+    for start, end, factor in timing.dense:
+        density = np.where((middle >= start) & (middle <= end), density * factor, density)
+    share = np.concatenate([[0.0], np.cumsum(density)])
+    return np.interp(np.linspace(0.0, share[-1], timing.steps + 1), share, fine)
+
+
+def _limits(limits: schema.LimitsConfig, arm: Arm) -> Limits:
+    """The description's limits as far as `kind` takes them, overridden by the values given."""
+    description, free = arm.description, np.full(arm.n, np.inf)
+    joint, all_of_them = limits.kind != "none", limits.kind == "joint_torque_power"
+
+    def bound(key: str, own: Array) -> Array:
+        given = getattr(limits, key)
+        if given is None:
+            return own
+        if isinstance(given, list) and len(given) != arm.n:
+            raise ConfigError(f"limits.{key} has {len(given)} values, the arm has {arm.n} moving joints")
+        return np.broadcast_to(np.asarray(given, dtype=float), arm.n).copy()
+
+    return Limits(
+        lower=bound("lower", description.lower if joint else -free),
+        upper=bound("upper", description.upper if joint else free),
+        velocity=bound("velocity", description.velocity if joint else free),
+        torque=bound("torque", description.effort if all_of_them else free),
+        power=bound("power", free),
+    )
+
+
+def _check(problem: Problem) -> None:
+    """Refuse what no motion can meet: contradicting limits, a fixed start outside them, an open path for a cycle."""
+    limits, names = problem.bounds, problem.task.arm.description.joints
+    for joint in np.flatnonzero(limits.lower >= limits.upper):
+        raise ConfigError(
+            f"limits.lower of {names[joint]} ({limits.lower[joint]:.4g}) is not below limits.upper ({limits.upper[joint]:.4g})"
+        )
+    weights = problem.objective.kinetic_energy + problem.objective.torque
+    if abs(weights - 1.0) > 1e-9:
+        raise ConfigError(f"objective.kinetic_energy + objective.torque = {weights:g}: the weights must add up to 1")
+    if problem.boundary is Boundary.FIXED:
+        outside = np.flatnonzero((problem.q_init < limits.lower) | (problem.q_init > limits.upper))
+        for joint in outside:
+            raise ConfigError(
+                f"robot.q_init of {names[joint]} is {problem.q_init[joint]:.4g}, outside its limits "
+                f"{limits.lower[joint]:.4g} to {limits.upper[joint]:.4g}, and boundary = fixed starts there"
+            )
+    if problem.boundary is Boundary.CYCLIC:
+        ends = problem.reference.position(np.array([0.0, problem.reference.duration]))
+        gap = float(np.linalg.norm(ends[1] - ends[0]))
+        if gap > 1e-9:
+            raise PathError(
+                f"boundary = cyclic: the path ends {gap:.3g} m from where it starts; a cycle needs a closed path"
+            )
+
+
+def _find(urdf: str) -> File:
+    """A robot description by absolute path, or relative to the working directory or else to the project."""
+    given = File(urdf).expanduser()
+    if not given.is_absolute() and not given.is_file() and (PROJECT / given).is_file():
+        return PROJECT / given
+    return given
+
+
+def _geometry(path: Any, task: PositionTask, q_init: Array) -> tuple[Geometry, Array]:
+    """The path's curve, and q_init moved onto its start if the path says where it starts."""
+    here = task.value(q_init[None])[0]
+    if isinstance(path, schema.WaypointsConfig):
+        if path.file in ("", "???"):
+            raise ConfigError("path.file: not given; the way-points are rows of a CSV file, e.g. path.file=points.csv")
+        points = read_waypoints(path.file, task.axes)
+        if path.relative:
+            points = points + here - points[0]
+        return Spline(points), place(task, q_init, points[0])
+    start = here
+    if path.start is not None:
+        if len(path.start) != task.m:
+            raise ConfigError(f"path.start = {path.start}: must be {task.m} numbers m, one for each of robot.task")
+        start = np.array(path.start)
+        q_init = place(task, q_init, start)
+    if isinstance(path, schema.CircleConfig):
+        return (
+            circle(
+                start,
+                path.center_direction,
+                path.radius,
+                clockwise=path.clockwise,
+                normal=path.normal,
+                angle=path.angle,
+            ),
+            q_init,
+        )
+    return Line(start, direction_vector(path.direction, task.m), path.length), q_init
+
+
+def _require_reach(problem: Problem) -> None:
+    """Refuse a path that leaves the arm's reach, saying where along it and by how much."""
+    task, geometry = problem.task, problem.reference.geometry
+    s = np.linspace(0.0, geometry.length, 101)
+    points = geometry.sample(s)[0]
+    # From the nearest of several configurations: one start alone can get stuck although the point can be reached.
+    rng = np.random.default_rng(0)
+    guesses = np.concatenate([problem.q_init[None], rng.uniform(-np.pi, np.pi, (11, task.arm.n))])
+    gap = np.full(len(points), np.inf)
+    for guess in guesses:
+        open_points = gap > 1e-6
+        if not open_points.any():
+            return
+        _, left = project(task, np.tile(guess, (int(open_points.sum()), 1)), points[open_points])
+        gap[open_points] = np.minimum(gap[open_points], left)
+    out = np.flatnonzero(gap > 1e-6)
+    if out.size:
+        worst = int(np.argmax(gap))
+        raise PathError(
+            f"path: out of reach from {s[out[0]]:.3g} m along its {geometry.length:.3g} m on; "
+            f"the arm misses it by up to {gap[worst]:.3g} m (at {s[worst]:.3g} m)"
+        )
