@@ -8,11 +8,13 @@ from __future__ import annotations
 import os
 import re
 import sys
+import traceback
 from pathlib import Path
 
 import hydra
 from hydra.core.hydra_config import HydraConfig
-from hydra.errors import HydraException, MissingConfigException
+from hydra.errors import HydraException, MissingConfigException, OverrideParseException
+from hydra.types import RunMode
 from omegaconf import DictConfig
 from omegaconf.errors import OmegaConfBaseException
 
@@ -24,17 +26,30 @@ CONF = str(Path(__file__).resolve().parent.parent / "conf")
 
 
 def job(values: DictConfig) -> int:
-    """One run, alone or within a sweep; never raises for bad input, so that a sweep goes on."""
-    from pipeline import run
-    from pipeline.artifacts import tables
+    """One run, alone or within a sweep. A run of a sweep never raises, so that the others go on."""
+    from pipeline import resume, run
+    from pipeline.artifacts import sweep
 
-    folder = Path(HydraConfig.get().runtime.output_dir)
+    hydra_values = HydraConfig.get()
+    folder, sweeping = Path(hydra_values.runtime.output_dir), hydra_values.mode is RunMode.MULTIRUN
     try:
-        code = run.run_and_write(session.checked(values), folder)
+        config = session.checked(values)
+        done = resume.finished(folder, config) if sweeping and config.sweep.resume else None
+        if done is not None:
+            print(f"{folder.name}: finished before, skipped (sweep.resume)", flush=True)
+            return done
+        if sweeping:
+            resume.forget(folder)
+        code = run.run_and_write(config, folder)
     except InputError as error:
         print(f"error: {error}", file=sys.stderr)
-        tables.write_failure(folder, values.get("name", ""), str(error))
+        sweep.write_failure(folder, str(error))
         code = 2
+    except Exception as error:
+        if not sweeping:
+            raise
+        print(f"error: {folder.name}: {sweep.write_crash(folder, error)}", file=sys.stderr)
+        code = 1
     session.exit_code = max(session.exit_code, code)
     return code
 
@@ -51,6 +66,11 @@ def main() -> int:
         return _complain(_in_one_line(error))
     except OSError as error:
         return _complain(str(OutputError(f"cannot write {error.filename!s}: {error.strerror}")))
+    except ValueError as error:
+        # Hydra lets some malformed overrides through to a bare ValueError; any other one is a bug of ours.
+        if not re.search(r"[/\\](omegaconf|hydra)[/\\]", traceback.extract_tb(error.__traceback__)[-1].filename):
+            raise
+        return _complain(f"{' '.join(sys.argv[1:])}: {_in_one_line(error)}")
     except KeyboardInterrupt:
         return _complain("interrupted", 130)
     return session.exit_code
@@ -68,6 +88,8 @@ def _in_one_line(error: Exception) -> str:
         allowed = ", ".join(sorted(error.options or []))
         return f"{group or 'config'} = {option}: no such option; allowed: {allowed or 'see conf/'}"
     message = str(error.__cause__ or error)
+    if isinstance(error, OverrideParseException):
+        message = f"in {' '.join(sys.argv[1:])}: {error}"
     unknown = re.search(r"Could not (?:override|append to config\.?[^']*|find) '([^']+)'", str(error))
     if unknown:
         return str(unknown_key(unknown.group(1), _keys_beside(unknown.group(1))))

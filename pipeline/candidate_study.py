@@ -40,5 +40,6 @@ def study(problem: Problem, optimum: float, options: GlobalOptions, config: Cand
     mean = np.mean(curves, axis=0)
     parameters = len(problem.times) * problem.task.arm.n
     tail = count >= parameters
-    exponent, intercept = np.polyfit(np.log(count[tail]), mean[tail], 1)
+    enough = tail.sum() >= 3
+    exponent, intercept = np.polyfit(np.log(count[tail]), mean[tail], 1) if enough else (np.nan, np.nan)
     return Study(count, np.exp(mean), parameters, float(intercept), float(exponent))

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 from pipeline.schema import (
     angle_or_vector,
@@ -44,7 +44,7 @@ class RobotConfig:
     offset: list[float] = numbers([0.0, 0.0, 0.0], length=3, unit="m")
     task: list[str] = choices(["x", "y"], "x", "y", "z")
     q_init: list[float] = numbers([0.0, 0.327, -0.754], unit="rad")
-    locked: dict[str, float] = mapping(any_number)
+    locked: dict[str, float] | None = mapping(any_number, optional=True)
 
 
 @dataclass(frozen=True)
@@ -82,17 +82,37 @@ class TimingConfig:
 
     law: str = choice("raised_cosine", "raised_cosine", "constant_speed", "quintic")
     duration: float = number(10.0, above=0, unit="s")
-    steps: int = count(100, low=2)
+    steps: int = count(100, low=2, high=100_000)
     dense: list[list[float]] = intervals()
 
 
 @dataclass(frozen=True)
-class ObjectiveConfig:
-    """Group `objective`: which integral is minimised."""
+class KineticEnergyConfig:
+    """`objective=kinetic_energy`: the integral of the kinetic energy."""
 
-    kind: str = choice("kinetic_energy", "kinetic_energy", "torque", "weighted")
-    kinetic_energy: float = number(1.0, low=0, high=1)
-    torque: float = number(0.0, low=0, high=1)
+    kind: ClassVar[str] = "kinetic_energy"
+    weights: ClassVar[tuple[float, float]] = (1.0, 0.0)
+
+
+@dataclass(frozen=True)
+class TorqueConfig:
+    """`objective=torque`: the integral of the squared joint torques."""
+
+    kind: ClassVar[str] = "torque"
+    weights: ClassVar[tuple[float, float]] = (0.0, 1.0)
+
+
+@dataclass(frozen=True)
+class WeightedConfig:
+    """`objective=weighted`: a convex combination of both."""
+
+    kinetic_energy: float = number(0.5, low=0, high=1)
+    torque: float = number(0.5, low=0, high=1)
+    kind: ClassVar[str] = "weighted"
+
+    @property
+    def weights(self) -> tuple[float, float]:
+        return self.kinetic_energy, self.torque
 
 
 @dataclass(frozen=True)
@@ -186,6 +206,14 @@ class ParallelConfig:
     """Group `parallel`: how independent solves are spread."""
 
     workers: int | None = count(None)
+    address: str | None = text(None)
+
+
+@dataclass(frozen=True)
+class SweepConfig:
+    """What a sweep does besides its runs."""
+
+    resume: bool = switch(True)
 
 
 @dataclass(frozen=True)
@@ -204,7 +232,7 @@ class CandidateStudyConfig:
     """The Global paper's Fig. 1: how near the best of so many candidates comes to the optimum."""
 
     run: bool = switch(False)
-    most: int = count(10000, low=10)
+    most: int = count(10000, low=100)
     repeats: int = count(5)
 
 
@@ -241,11 +269,14 @@ class RunConfig:
         {"line": LineConfig, "circle": CircleConfig, "waypoints": WaypointsConfig}, "line"
     )
     timing: TimingConfig = part(TimingConfig)
-    objective: ObjectiveConfig = part(ObjectiveConfig)
+    objective: KineticEnergyConfig | TorqueConfig | WeightedConfig = one_of(
+        {"kinetic_energy": KineticEnergyConfig, "torque": TorqueConfig, "weighted": WeightedConfig}, "kinetic_energy"
+    )
     limits: LimitsConfig = part(LimitsConfig)
     boundary: BoundaryConfig = part(BoundaryConfig)
     method: MethodConfig = part(MethodConfig)
     parallel: ParallelConfig = part(ParallelConfig)
+    sweep: SweepConfig = part(SweepConfig)
     pareto: ParetoOptions = part(ParetoOptions)
     candidate_study: CandidateStudyConfig = part(CandidateStudyConfig)
     published: PublishedConfig = part(PublishedConfig)

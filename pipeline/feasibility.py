@@ -28,9 +28,10 @@ class Violation:
     @property
     def sentence(self) -> str:
         unit = UNITS[self.kind]
+        percent = f"{100 * self.relative:.0f}" if self.relative > 0.1 else f"{100 * self.relative:.2g}"
         return (
             f"no feasible motion: the {self.kind} limit of {self.joint} ({self.limit:.4g} {unit}) cannot be met; the least "
-            f"violation found is {100 * self.relative:.2g} % ({self.reached:.4g} {unit} at t = {self.time:.3g} s)"
+            f"violation found is {percent} % ({self.reached:.4g} {unit} at t = {self.time:.3g} s)"
         )
 
 
@@ -82,6 +83,8 @@ def least_violation(problem: Problem, times: Array, guesses: list[Array]) -> Rel
     If no kind suffices alone, all give way together. None if no solve succeeds. A motion without any excess is feasible:
     the way to it led through motions that are not, which other solves do not dare.
     """
+    if not guesses:
+        return None
     kinds = list(dict.fromkeys(violation.kind for violation in violations(problem, times, guesses[0])))
     best: Relaxed | None = None
     for kind in kinds:

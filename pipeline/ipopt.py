@@ -50,6 +50,8 @@ def solve(
         "max_wall_time": max_time,
         "limited_memory_max_history": 8,
         "bound_relax_factor": 0.0,
+        # A hopeless start turns to feasibility early, and is given up early.
+        "expect_infeasible_problem": "yes",
         "constr_viol_tol": 1e-8,
         # Where many limits are active the last digits of optimality can be out of reach, never those of feasibility.
         "acceptable_tol": 1e-6,

@@ -40,9 +40,7 @@ TIMINGS: dict[str, Callable[[float], Timing]] = {
 def prepare(config: schema.RunConfig) -> Problem:
     """The problem that a configuration states; raises InputError, one line, if it cannot be posed."""
     robot = config.robot
-    arm = Arm.from_urdf(
-        _find(robot.urdf), robot.end_effector, base=robot.base, offset=robot.offset, locked=robot.locked
-    )
+    arm = Arm.from_urdf(find(robot.urdf), robot.end_effector, base=robot.base, offset=robot.offset, locked=robot.locked)
     task = PositionTask(arm, tuple(robot.task))
     if len(robot.q_init) != arm.n:
         names = ", ".join(arm.description.joints)
@@ -55,7 +53,7 @@ def prepare(config: schema.RunConfig) -> Problem:
         reference,
         q_init,
         _knots(config.timing),
-        objective=Objective(config.objective.kinetic_energy, config.objective.torque),
+        objective=Objective(*config.objective.weights),
         limits=_limits(config.limits, arm),
         boundary=Boundary(config.boundary.kind),
     )
@@ -68,6 +66,11 @@ def _knots(timing: schema.TimingConfig) -> Array:
     """The grid (steps + 1,) [s]: even, or finer by the factors of `dense`."""
     if not timing.dense:
         return np.linspace(0.0, timing.duration, timing.steps + 1)
+    latest = max(end for _, end, _ in timing.dense)
+    if latest > timing.duration:
+        raise ConfigError(
+            f"timing.dense reaches to {latest:g} s, the motion ends at timing.duration = {timing.duration:g} s"
+        )
     fine = np.linspace(0.0, timing.duration, 20 * timing.steps + 1)
     density = np.ones(len(fine) - 1)
     middle = (fine[1:] + fine[:-1]) / 2
@@ -125,12 +128,12 @@ def _check(problem: Problem) -> None:
             )
 
 
-def _find(urdf: str) -> File:
+def find(urdf: str) -> File:
     """A robot description by absolute path, or relative to the working directory or else to the project."""
     given = File(urdf).expanduser()
     if not given.is_absolute() and not given.is_file() and (PROJECT / given).is_file():
         return PROJECT / given
-    return given
+    return given.absolute()  # kept results are found again from any working directory
 
 
 def _geometry(path: Any, task: PositionTask, q_init: Array) -> tuple[Geometry, Array]:

@@ -116,6 +116,7 @@ class Solution:
 
     `optimum` counts distinct optima of one method from 1 on. `event_time` [s] is when a singularity was met.
     `tracking_tolerance` [m] is what the method promises to keep of the path at its knots; the evaluation checks it.
+    `found` is False where there is no motion to speak of: the trajectory then only holds the arm at its start.
     """
 
     method: str
@@ -125,6 +126,7 @@ class Solution:
     optimum: int = 1
     event_time: float | None = None
     tracking_tolerance: float = np.inf
+    found: bool = True
     statistics: dict[str, Any] = field(default_factory=dict)
 
 

@@ -2,22 +2,33 @@
 
 from __future__ import annotations
 
-import platform
 import shutil
-import sys
 import time
 from collections.abc import Callable
 from pathlib import Path as File
 
 from pipeline import config as schema
-from pipeline import extras
+from pipeline import extras, resume
 from pipeline.evaluation import evaluate
 from pipeline.methods import calculus_of_variations, dynamic_programming, global_planner, lsv, pareto, pmke
 from pipeline.parallel import Workers
 from pipeline.prepare import prepare
 from pipeline.problem import Problem, Progress, Solution
+from pipeline.versions import versions
 
 UNFINISHED = ".unfinished"  # finished solves of a run that is not finished: what a resumed run starts from
+
+
+def state(config: schema.RunConfig) -> Problem:
+    """The problem of a configuration, refused before anything is solved if a method asked for does not serve it."""
+    problem = prepare(config)
+    if "dynamic_programming" in config.methods or (
+        "global" in config.methods and config.method.global_.starts != "population"
+    ):
+        dynamic_programming.check(problem)
+    if "calculus_of_variations" in config.methods:
+        calculus_of_variations.check(problem)
+    return problem
 
 
 def solve(
@@ -53,12 +64,15 @@ def run_and_write(config: schema.RunConfig, folder: File) -> int:
         stages[stage] = round(time.perf_counter() - begin, 4)
 
     begin = time.perf_counter()
-    problem = prepare(config)
+    problem = state(config)
+    inputs = resume.inputs(config)
+    workers = Workers(config.parallel.workers, folder / UNFINISHED, config.parallel.address)
+    workers.check()
     timed("prepare", begin)
 
     begin = time.perf_counter()
     with console.progress(config.name) as progress:
-        results = solve(problem, config, Workers(config.parallel.workers, folder / UNFINISHED), progress)
+        results = solve(problem, config, workers, progress)
     timed("solve", begin)
 
     begin = time.perf_counter()
@@ -94,22 +108,9 @@ def run_and_write(config: schema.RunConfig, folder: File) -> int:
         picture=picture,
     )
     timed("recording", begin)
+    code = 0 if all(evaluation.confirmed for evaluation in evaluations) else 1
+    facts |= {"inputs": inputs, "exit_code": code}
     tables.write_run(folder, config, facts, results, evaluations, stages)
     shutil.rmtree(folder / UNFINISHED, ignore_errors=True)
     console.report(summary, folder)
-    return 0 if all(evaluation.confirmed for evaluation in evaluations) else 1
-
-
-def versions() -> dict[str, str]:
-    """What the numbers were made with."""
-    from importlib.metadata import PackageNotFoundError, version
-
-    def of(package: str) -> str:
-        try:
-            return version(package)
-        except PackageNotFoundError:
-            return "not installed"
-
-    packages = ("selfmotion", "drake", "numpy", "scipy", "pandas", "rerun-sdk", "hydra-core", "matplotlib")
-    machine = f"{platform.system()} {platform.machine()}"
-    return {"python": sys.version.split()[0], "machine": machine, **{package: of(package) for package in packages}}
+    return code

@@ -22,7 +22,8 @@ Check = Callable[[Any, str], Any]
 
 
 def _fail(key: str, value: Any, problem: str) -> ConfigError:
-    return ConfigError(f"{key} = {value!r}: {problem}" if isinstance(value, str) else f"{key} = {value}: {problem}")
+    shown = {None: "null", True: "true", False: "false"}.get(value, value) if isinstance(value, bool | None) else value
+    return ConfigError(f"{key} = {value!r}: {problem}" if isinstance(value, str) else f"{key} = {shown}: {problem}")
 
 
 def _field(default: Any, check: Check) -> Any:
@@ -107,7 +108,7 @@ def choices(default: Sequence[str], *allowed: str) -> Any:
 
 def text(default: str | None) -> Any:
     def check(value: Any, key: str) -> str:
-        if isinstance(value, dict | list):
+        if value is None or isinstance(value, dict | list):
             raise _fail(key, value, "must be text")
         return str(value)
 
@@ -173,7 +174,7 @@ def angle_or_vector(default: float | None) -> Any:
     return _field(default, check)
 
 
-def mapping(of: Check | None = None) -> Any:
+def mapping(of: Check | None = None, *, optional: bool = False) -> Any:
     """A free-form table: its keys are data, not options."""
 
     def check(value: Any, key: str) -> dict[str, Any]:
@@ -181,7 +182,7 @@ def mapping(of: Check | None = None) -> Any:
             raise _fail(key, value, "must be a table of keys and values")
         return {str(name): entry if of is None else of(entry, f"{key}.{name}") for name, entry in value.items()}
 
-    return _field({}, check)
+    return _field(None, _optional(None, check)) if optional else _field({}, check)
 
 
 def any_number(value: Any, key: str) -> float:

@@ -3,22 +3,28 @@
 from __future__ import annotations
 
 import sys
+import uuid
 from pathlib import Path
 from typing import Any
 
 from hydra.experimental.callback import Callback
 from omegaconf import DictConfig, OmegaConf
+from omegaconf.errors import OmegaConfBaseException
 
 from pipeline import config as schema
-from pipeline.errors import InputError
+from pipeline.errors import ConfigError, InputError
 
+MARK = ".sweep"  # in a run's folder: which start of a sweep it belongs to
 exit_code = 0  # of the process: 0 all confirmed, 1 a method failed, 2 bad input
 
 
 def checked(values: DictConfig) -> schema.RunConfig:
     """The typed configuration of a composed one; raises ConfigError."""
     own = OmegaConf.masked_copy(values, [str(key) for key in values if key != "hydra"])
-    plain = OmegaConf.to_container(own, resolve=True, throw_on_missing=False)
+    try:
+        plain = OmegaConf.to_container(own, resolve=True, throw_on_missing=False)
+    except OmegaConfBaseException as error:
+        raise ConfigError(f"{error.full_key}: {str(error.msg).splitlines()[0]}") from None
     assert isinstance(plain, dict)
     return schema.check({str(key): value for key, value in plain.items()})
 
@@ -26,18 +32,42 @@ def checked(values: DictConfig) -> schema.RunConfig:
 class Session(Callback):
     """Hydra's hooks. Hydra swallows exceptions of a callback, so bad input ends the process here."""
 
+    def __init__(self) -> None:
+        self.sweep = ""  # a launcher takes this object along to the processes of its runs
+
     def on_run_start(self, config: DictConfig, **_: Any) -> None:
         """Refuse bad input before Hydra makes the output folder."""
-        from pipeline.prepare import prepare
+        from pipeline.parallel import Workers
+        from pipeline.run import state
 
         try:
-            prepare(checked(config))
+            asked = checked(config)
+            state(asked)
+            Workers(address=asked.parallel.address).check()
         except InputError as error:
             print(f"error: {error}", file=sys.stderr)
             raise SystemExit(2) from None
 
-    def on_multirun_end(self, config: DictConfig, **_: Any) -> None:
-        """Put the summaries of all runs of the sweep into one table."""
-        from pipeline.artifacts import tables
+    def on_multirun_start(self, config: DictConfig, **_: Any) -> None:
+        self.sweep = uuid.uuid4().hex
 
-        tables.write_sweep(Path(config.hydra.sweep.dir))
+    def on_job_start(self, config: DictConfig, **_: Any) -> None:
+        """Mark the folders of this sweep: others may lie beside them from an earlier one."""
+        if self.sweep:
+            (Path(config.hydra.runtime.output_dir) / MARK).write_text(self.sweep, encoding="utf-8")
+
+    def on_multirun_end(self, config: DictConfig, **_: Any) -> None:
+        """Put the summaries of all runs of the sweep into one table; the worst of their exit codes is the sweep's."""
+        from pipeline.artifacts import sweep
+
+        global exit_code
+        exit_code = 1  # if anything below fails
+        folder = Path(config.hydra.sweep.dir)
+        marks = [file for file in folder.rglob(MARK) if file.read_text(encoding="utf-8") == self.sweep]
+        runs = [mark.parent for mark in marks]
+        try:
+            sweep.write(folder, runs)
+        except OSError as error:
+            print(f"error: cannot write {error.filename!s}: {error.strerror}", file=sys.stderr)
+            raise SystemExit(2) from None
+        exit_code = max(map(sweep.exit_code, runs), default=0)

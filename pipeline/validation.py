@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from pipeline.candidates import path_distance
 from pipeline.evaluation import Evaluation
@@ -20,14 +21,12 @@ def table(problem: Problem, evaluations: Sequence[Evaluation]) -> pd.DataFrame:
     revolute = problem.task.arm.description.revolute
     planner = [e for e in evaluations if e.method == "global" and e.confirmed]
     stationary = [e for e in evaluations if e.method == "calculus_of_variations" and e.confirmed]
-    rows, used = [], set()
-    for e in planner:
-        distances = [path_distance(e.q, other.q, revolute) for other in stationary]
-        partner = int(np.argmin(distances)) if distances else -1
+    pairs = _pairs(planner, stationary, revolute)
+    rows = []
+    for index, e in enumerate(planner):
         row = {"planner_optimum": e.solution.optimum, "planner_energy": e.energy_integral[-1]}
-        if partner >= 0 and distances[partner] < SAME:
-            used.add(partner)
-            other = stationary[partner]
+        if index in pairs:
+            other = stationary[pairs[index]]
             row |= {
                 "stationary_motion": other.solution.optimum,
                 "stationary_energy": other.solution.statistics["energy_integral"],
@@ -36,12 +35,12 @@ def table(problem: Problem, evaluations: Sequence[Evaluation]) -> pd.DataFrame:
             }
         else:
             row["remark"] = (
-                "no stationary motion near it: an optimum of the finite-difference sum on these knots that continuous time "
-                "does not have; it moves or disappears on finer grids (timing.steps)"
+                "no stationary motion near it: an optimum of the finite-difference sum on these knots that continuous "
+                "time does not have; it moves or disappears on finer grids (timing.steps)"
             )
         rows.append(row)
     for index, other in enumerate(stationary):
-        if index not in used:
+        if index not in pairs.values():
             kind = other.solution.statistics["kind"]
             remark = (
                 "the planner did not find it"
@@ -64,3 +63,17 @@ def table(problem: Problem, evaluations: Sequence[Evaluation]) -> pd.DataFrame:
         "mean_absolute_difference",
     ]
     return pd.DataFrame(rows, columns=[*columns, "kind", "remark"])
+
+
+def _pairs(planner: list[Evaluation], stationary: list[Evaluation], revolute: NDArray[np.bool_]) -> dict[int, int]:
+    """Which stationary motion belongs to which optimum: one to one, nearest first."""
+    distances = sorted(
+        (path_distance(e.q, other.q, revolute), i, j)
+        for i, e in enumerate(planner)
+        for j, other in enumerate(stationary)
+    )
+    pairs: dict[int, int] = {}
+    for distance, i, j in distances:
+        if distance < SAME and i not in pairs and j not in pairs.values():
+            pairs[i] = j
+    return pairs

@@ -10,10 +10,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pipeline.arrays import Array
-from pipeline.candidates import distinct, initial_configurations, path_distance, population, random_inverse_weights
+from pipeline.candidates import distinct, diverse, path_distance, population, random_inverse_weights
 from pipeline.costs import integrals, objective_values
 from pipeline.path import Line, RaisedCosine, Reference
 from pipeline.problem import Objective, Problem
+from pipeline.self_motion import random_configurations
 from pipeline.task import PositionTask
 
 Make = Callable[[int, int], Problem]
@@ -39,7 +40,7 @@ def motions_of(problem: Problem, count: int, seed: int = 0) -> Array:
 @pytest.mark.parametrize("number", [1, 2, 3, 4])
 def test_population_follows_the_path_from_its_starts(problem: Make, q_init: Array, number: int) -> None:
     asked = problem(number, 25)
-    starts = initial_configurations(asked.task, q_init, 4, np.random.default_rng(1))
+    starts = random_configurations(asked.task, q_init, 4, np.random.default_rng(1))
     motions = population(asked, asked.times, starts, 40, np.random.default_rng(3))
     assert 5 < len(motions) <= 40
     assert all(np.any(np.all(motion[0] == starts, axis=1)) for motion in motions)
@@ -76,19 +77,6 @@ def test_a_stretched_start_does_not_end_the_run(task: PositionTask) -> None:
     assert np.isfinite(motions_of(asked, 8)).all()
 
 
-@pytest.mark.parametrize("draw", ["normal", "latin_hypercube"])
-def test_initial_configurations_share_the_end_effector(task: PositionTask, q_init: Array, draw: str) -> None:
-    first, same = (initial_configurations(task, q_init, 60, np.random.default_rng(2), draw=draw) for _ in range(2))
-    np.testing.assert_array_equal(first, same)
-    np.testing.assert_allclose(first[0], q_init, atol=1e-15)
-    assert 30 < len(first) <= 60
-    np.testing.assert_allclose(task.value(first), np.tile(task.value(q_init[None]), (len(first), 1)), atol=1e-9)
-    assert np.abs(first).max() <= np.pi
-    pairs = np.abs(first[:, None] - first).max(axis=2) + 10 * np.eye(len(first))
-    assert pairs.min() > 1e-3
-    assert len(initial_configurations(task, q_init, 1, np.random.default_rng(2), draw=draw)) == 1
-
-
 def test_costs_are_backward_sums(problem: Make, peer: SimpleNamespace, rng: np.random.Generator) -> None:
     times, motions = np.array([0.0, 0.1, 0.3, 0.35]), rng.normal(size=(5, 4, 3))
     asked = replace(problem(1, 3), objective=Objective(2.0, 0.1))
@@ -121,3 +109,13 @@ def test_distinct_keeps_the_cheapest_of_each_kind() -> None:
     assert distinct(motions, costs, 10, 0.01, TURNS) == [5, 1, 4]
     assert distinct(motions, costs, 2, 0.01, TURNS) == [5, 1]
     assert distinct(motions, costs, 10, 0.001, TURNS) == [5, 1, 2, 4, 3]
+
+
+def test_diverse_takes_far_motions_before_near_ones() -> None:
+    valley = np.linspace(0, 0.01, 30)[:, None, None] * np.ones((30, 3, 3))
+    far = np.stack([np.full((3, 3), 1.0), np.full((3, 3), -1.0)])
+    motions, costs = np.concatenate([valley, far]), np.concatenate([np.linspace(1, 2, 30), [5.0, 6.0]])
+    chosen = diverse(motions, costs, 4, 1e-3, TURNS)
+    assert chosen[0] == 0
+    assert {30, 31} <= set(chosen)
+    assert set(distinct(motions, costs, 4, 1e-4, TURNS)) == {0, 1, 2, 3}  # the cheapest alone see one valley

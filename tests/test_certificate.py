@@ -97,5 +97,12 @@ def test_which_solutions_can_be_compared(optima: list[Solution], on_grid: Soluti
     lsv = replace(optima[0], method="lsv")
     assert certificate.comparable([lsv, *optima, on_grid, second]) == (optima[0], on_grid)
     assert certificate.comparable([on_grid, second, *optima]) == (optima[0], on_grid)
-    for some in ([], optima, [on_grid], [failed, on_grid], [lsv, on_grid], [*optima, replace(on_grid, status=Status.INFEASIBLE)]):
+    for some in (
+        [],
+        optima,
+        [on_grid],
+        [failed, on_grid],
+        [lsv, on_grid],
+        [*optima, replace(on_grid, status=Status.INFEASIBLE)],
+    ):
         assert certificate.comparable(some) is None

@@ -48,7 +48,9 @@ def test_the_integrals_are_those_that_are_reported(
 def test_velocities_of_many_motions_are_those_of_each(task: PositionTask, q_init: Array, motions: Array) -> None:
     start = task.value(q_init[None])[0]
     for boundary in Boundary:
-        problem = Problem(task, Reference(circle(start, 0.0, 0.05), RaisedCosine(1.0)), q_init, TIMES, boundary=boundary)
+        problem = Problem(
+            task, Reference(circle(start, 0.0, 0.05), RaisedCosine(1.0)), q_init, TIMES, boundary=boundary
+        )
         stacked = velocities(problem, TIMES, motions)
         for one, q in zip(stacked, motions, strict=True):
             np.testing.assert_array_equal(one, velocities(problem, TIMES, q))

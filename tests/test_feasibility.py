@@ -51,16 +51,16 @@ def least_fold(task: PositionTask, distance: float) -> float:
 
 
 @pytest.mark.parametrize("fraction", [0.98, 0.8])
-def test_least_violation_of_position_limits_is_the_true_one(
-    task: PositionTask, q_init: Array, fraction: float
-) -> None:
+def test_least_violation_of_position_limits_is_the_true_one(task: PositionTask, q_init: Array, fraction: float) -> None:
     plain = inward(task, q_init, Limits.none(3))
     distance = float(np.linalg.norm(plain.reference.position(plain.times), axis=1).min())
     needed = least_fold(task, distance)
     bound = fraction * needed * np.array([np.inf, 1.0, 1.0])
     problem = inward(task, q_init, Limits(-bound, bound, FREE, FREE, FREE))
-    found = least_violation(problem, problem.times, [motion_along(problem)])
-    assert found is not None
+    relaxed = least_violation(problem, problem.times, [motion_along(problem)])
+    assert relaxed is not None
+    assert not relaxed.feasible
+    found = relaxed.worst
     assert found.kind == "position"
     assert found.joint in ("joint2", "joint3")
     # Relative to half the range, which is the limit itself here.
@@ -77,7 +77,10 @@ def test_a_limit_just_wide_enough_is_not_violated(task: PositionTask, q_init: Ar
     problem = inward(task, q_init, Limits(-bound, bound, FREE, FREE, FREE))
     found = least_violation(problem, problem.times, [motion_along(problem)])
     assert found is not None
-    assert found.relative < 1e-5
+    assert found.feasible
+    assert found.worst.relative <= 1e-6
+    assert np.abs(found.q[:, 1:]).max() <= bound[1] * (1 + 1e-6)
+    np.testing.assert_allclose(task.value(found.q), problem.reference.position(problem.times), atol=1e-6)
 
 
 @pytest.mark.parametrize("fraction", [0.95, 0.5])
@@ -95,8 +98,9 @@ def test_least_violation_of_velocity_limits_is_the_true_one(
     needed = float(np.abs(gap).max(axis=1).min())
     limits = Limits(-FREE, FREE, np.full(3, fraction * needed), FREE, FREE)
     problem = Problem(task, Reference(line, RaisedCosine(1.0)), q_init, times, limits=limits)
-    found = least_violation(problem, times, [motion_along(problem)])
-    assert found is not None
+    relaxed = least_violation(problem, times, [motion_along(problem)])
+    assert relaxed is not None
+    found = relaxed.worst
     assert (found.kind, found.time) == ("velocity", 1.0)
     assert found.relative == pytest.approx(1 / fraction - 1, abs=1e-3)
 
@@ -109,7 +113,23 @@ def test_the_best_of_several_starts_counts(task: PositionTask, q_init: Array) ->
     alone = [least_violation(problem, problem.times, [guess]) for guess in (own, mirrored)]
     both = least_violation(problem, problem.times, [mirrored, own])
     assert both is not None
-    assert both.relative == min(found.relative for found in alone if found is not None)
+    assert both.worst.relative == min(found.worst.relative for found in alone if found is not None)
+
+
+def test_the_limit_to_blame_is_the_one_that_must_give_way(task: PositionTask, q_init: Array) -> None:
+    """Joint positions are wide enough alone and velocities are not; then the other way round."""
+    plain = inward(task, q_init, Limits.none(3))
+    distance = float(np.linalg.norm(plain.reference.position(plain.times), axis=1).min())
+    needed = least_fold(task, distance) * np.array([np.inf, 1.0, 1.0])
+    for width, speed, blamed in ((1.3, 0.5, "velocity"), (0.7, 20.0, "position")):
+        limits = Limits(-width * needed, width * needed, np.full(3, speed), FREE, FREE)
+        problem = inward(task, q_init, limits)
+        found = least_violation(problem, problem.times, [motion_along(plain)])
+        assert found is not None
+        assert found.worst.kind == blamed
+        kept = [other for other in violations(problem, problem.times, found.q) if other.kind != blamed]
+        assert kept
+        assert max(other.relative for other in kept) < 1e-6
 
 
 def test_no_start_no_answer(task: PositionTask, q_init: Array) -> None:
@@ -120,9 +140,7 @@ def test_no_start_no_answer(task: PositionTask, q_init: Array) -> None:
 def test_violations_name_the_worst_knot_and_joint_of_each_kind(task: PositionTask, q_init: Array) -> None:
     times = np.array([0.0, 1.0, 2.0, 3.0])
     q = np.array([[0.0, 0.0, 0.0], [0.2, 0.5, 0.0], [0.2, 0.6, -0.9], [0.3, 0.6, -0.9]])
-    limits = Limits(
-        np.array([-1.0, -1.0, -0.5]), np.array([1.0, 0.5, 0.5]), np.array([0.1, 1.0, np.inf]), FREE, FREE
-    )
+    limits = Limits(np.array([-1.0, -1.0, -0.5]), np.array([1.0, 0.5, 0.5]), np.array([0.1, 1.0, np.inf]), FREE, FREE)
     start = task.value(q_init[None])[0]
     problem = Problem(task, Reference(Line(start, np.array([1.0, 0.0]), 0.01), RaisedCosine(3.0)), q_init, times)
     found = violations(Problem(**{**vars(problem), "limits": limits}), times, q)

@@ -168,7 +168,13 @@ def test_what_cannot_be_met_is_named(limit: str, unit: str) -> None:
     assert only.status is Status.INFEASIBLE
     assert not only.confirmed
     assert "\n" not in only.message
-    for part in ("no feasible motion", f"the {kind} limit of joint", f"({float(value):.4g} {unit})", "least violation", "%"):
+    for part in (
+        "no feasible motion",
+        f"the {kind} limit of joint",
+        f"({float(value):.4g} {unit})",
+        "least violation",
+        "%",
+    ):
         assert part in only.message
     # The number said: what is reached exceeds the limit by that many percent.
     percent = float(only.message.split("violation found is ")[1].split(" %")[0])

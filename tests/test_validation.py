@@ -37,7 +37,9 @@ def planner(problem: Problem, q: Array, optimum: int = 1, status: Status = Statu
 
 def stationary(problem: Problem, q: Array, optimum: int = 1, kind: str = "minimum") -> Evaluation:
     facts: dict[str, Any] = {"kind": kind, "energy_integral": ENERGIES[kind]}
-    solution = Solution("calculus_of_variations", Trajectory(problem.times, q), Status.SOLVED, "", optimum, statistics=facts)
+    solution = Solution(
+        "calculus_of_variations", Trajectory(problem.times, q), Status.SOLVED, "", optimum, statistics=facts
+    )
     return evaluate(problem, solution)
 
 

@@ -31,22 +31,23 @@ def draw(front: pd.DataFrame, name: str) -> Figure:
             some = points[points["bounded"] == bounded]
             if some.empty:
                 continue
-            side = {y: f"{y.replace('_', ' ')} bounded", x: f"{x.replace('_', ' ')} bounded", "": "unbounded"}[bounded]
+            bound = {y: f"{y.replace('_', ' ')} bounded", x: f"{x.replace('_', ' ')} bounded", "": "unbounded"}[bounded]
             axes.plot(
                 some[x],
                 some[y],
                 marker,
                 color=style.joint_color(number - 1),
                 markersize=6,
-                label=f"path class {number}, {side}",
+                label=f"path class {number}, {bound}",
             )
     apart = front[front["status"] == "dominated"]
     if not apart.empty:
         axes.plot(apart[x], apart[y], "x", color="0.55", label="dominated")
     for row in good[good["extreme"]].to_dict("records"):
         left = row[x] > good[x].mean()
-        place = {"xytext": (-8 if left else 8, 9), "ha": "right" if left else "left"}
-        axes.annotate("extreme", (row[x], row[y]), textcoords="offset points", fontsize=9, **place)
+        shift = (-8 if left else 8, 9)
+        side = "right" if left else "left"
+        axes.annotate("extreme", (row[x], row[y]), xytext=shift, textcoords="offset points", fontsize=9, ha=side)
         axes.plot(row[x], row[y], "o", markersize=13, markerfacecolor="none", color="0.2")
     for row in good[good["knee"]].to_dict("records"):
         axes.annotate(

@@ -1,4 +1,4 @@
-"""The tables of a run and of a sweep: summary.csv, summary.md, trajectories.parquet, run.json, sweep.csv, sweep.md."""
+"""The tables of a run: summary.csv, summary.md, trajectories.parquet, run.json."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def _row(e: Evaluation) -> dict[str, Any]:
     }
     for name, values in (("velocity", e.qd), ("torque", e.tau), ("power", e.power)):
         row |= {f"peak_{name}_{j + 1}": peak for j, peak in enumerate(np.abs(values).max(axis=0))}
-    return row | {
+    row |= {
         "min_singular_value": e.singular_value.min(),
         "min_spectral_radius": e.spectral_radius[radius],
         "min_spectral_radius_time": e.time[radius],
@@ -78,6 +78,12 @@ def _row(e: Evaluation) -> dict[str, Any]:
         "kind": e.solution.statistics.get("kind", ""),
         "singular_time": np.nan if e.solution.event_time is None else e.solution.event_time,
     }
+    return row if e.solution.found else _without_numbers(row)
+
+
+def _without_numbers(row: dict[str, Any]) -> dict[str, Any]:
+    """The row of a method that found no motion: an arm that stands still costs nothing, and that is no result."""
+    return {key: np.nan if isinstance(value, float) else value for key, value in row.items()}
 
 
 def trajectories(evaluations: Sequence[Evaluation]) -> pd.DataFrame:
@@ -105,7 +111,7 @@ def markdown(
         f"in {reference.duration:g} s, {len(problem.times) - 1} intervals, objective {config.objective.kind}, "
         f"limits {config.limits.kind}, boundary {config.boundary.kind}, seed {config.seed}.",
         "",
-        *_table(_by_quantity(evaluations, table)),
+        *markdown_table(_by_quantity(evaluations, table)),
         "",
     ]
     lines += [f"- **{e.label}**: {e.message or e.status.value}" for e in evaluations]
@@ -113,12 +119,12 @@ def markdown(
         grid = next(e for e in evaluations if e.method == "dynamic_programming")
         lines += ["", f"Certificate: {certificate.sentence(extras.certificate, len(grid.time) - 1)}."]
     if extras.validation is not None:
-        lines += ["", "## Planner and calculus of variations", "", *_table(_cells(extras.validation))]
+        lines += ["", "## Planner and calculus of variations", "", *markdown_table(_cells(extras.validation))]
     if extras.front is not None:
         good = extras.front[extras.front["status"] == "optimal"]
         share = hypervolume(good[extras.front.columns[2:4]].to_numpy())
         lines += ["", "## Pareto front", "", f"Hypervolume {share:.4f} of the rectangle between the extremes.", ""]
-        lines += _table(_cells(extras.front.drop(columns=["solver_status"])))
+        lines += markdown_table(_cells(extras.front.drop(columns=["solver_status"])))
     if extras.study is not None:
         study = extras.study
         lines += [
@@ -158,8 +164,8 @@ def _by_quantity(evaluations: Sequence[Evaluation], table: pd.DataFrame) -> list
     return rows
 
 
-def _table(rows: list[list[str]]) -> list[str]:
-    head, *body = ["| " + " | ".join(row) + " |" for row in rows]
+def markdown_table(rows: list[list[str]]) -> list[str]:
+    head, *body = ["| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |" for row in rows]
     return [head, "|---|" + "---:|" * (len(rows[0]) - 1), *body]
 
 
@@ -219,63 +225,6 @@ def write_run(
         folder / "run.json",
         lambda file: file.write_text(json.dumps(content, indent=1, default=_plain), encoding="utf-8"),
     )
-
-
-def write_failure(folder: Path, name: str, reason: str) -> None:
-    """A run of a sweep that could not be posed leaves its reason, so that the sweep's table has a row for it."""
-    row = pd.DataFrame([{"method": "", "optimum": 0, "status": "bad input", "message": reason}])
-    write_beside(folder / "summary.csv", lambda file: row.to_csv(file, index=False))
-
-
-def write_sweep(folder: Path) -> None:
-    """sweep.csv and sweep.md: the summaries of all runs below `folder`, one row per run and motion."""
-    parts = []
-    for file in sorted(folder.glob("*/summary.csv"), key=lambda file: _natural(file.parent.name)):
-        table = pd.read_csv(file)
-        table.insert(0, "run", file.parent.name)
-        parts.append(table)
-    if not parts:
-        return
-    table = pd.concat(parts, ignore_index=True)
-    write_beside(folder / "sweep.csv", lambda file: table.to_csv(file, index=False))
-    rows = [
-        [
-            "run",
-            "method",
-            "status",
-            "kinetic energy [J s]",
-            "printed",
-            "difference",
-            "torque integral [N² m² s]",
-            "message",
-        ]
-    ]
-    for row in table.to_dict("records"):
-        label = row["method"] if row["optimum"] in (0, 1) else f"{row['method']} {row['optimum']}"
-        printed, difference = (
-            row.get("published_kinetic_energy_integral", np.nan),
-            row.get("difference_kinetic_energy_integral", np.nan),
-        )
-        numbers = [
-            (row.get("kinetic_energy_integral", np.nan), "{:.4g}"),
-            (printed, "{:.4g}"),
-            (100 * difference, "{:+.2g} %"),
-        ]
-        numbers.append((row.get("torque_integral", np.nan), "{:.4g}"))
-        cells = ["" if pd.isna(value) else form.format(value) for value, form in numbers]
-        message = row["message"]
-        rows.append(
-            [row["run"], "" if pd.isna(label) else label, row["status"], *cells, "" if pd.isna(message) else message]
-        )
-    notes: Sequence[str] = table["published_note"].dropna().unique().tolist() if "published_note" in table else []
-    text = "\n".join([f"# Sweep {folder.name}", "", *_table(rows), "", *(f"- {note}" for note in notes), ""])
-    write_beside(folder / "sweep.md", lambda file: file.write_text(text, encoding="utf-8"))
-    print(f"sweep table in {folder / 'sweep.md'}")
-
-
-def _natural(name: str) -> tuple[int, str]:
-    number, _, rest = name.partition("_")
-    return (int(number) if number.isdigit() else -1), rest
 
 
 def _plain(value: Any) -> Any:

@@ -59,7 +59,7 @@ def solve(
     """All stationary motions on problem.times, cheapest first. Their statistics: `energy_integral` [J s] in continuous
     time, `kind` (minimum or saddle), `index`, `unknown` [rad or rad/s] and `residual` t' M qd at T.
     """
-    _check(problem)
+    check(problem)
     found: list[tuple[_Family, float]] = []
     near: list[tuple[float, float]] = []
     families = _families(problem, options)
@@ -74,7 +74,11 @@ def solve(
     if not motions:
         standing = np.tile(problem.q_init, (len(problem.times), 1))
         message = "no stationary motion was found: scan more densely, or further for a fixed start"
-        return [Solution("calculus_of_variations", Trajectory(problem.times, standing), Status.INFEASIBLE, message)]
+        return [
+            Solution(
+                "calculus_of_variations", Trajectory(problem.times, standing), Status.INFEASIBLE, message, found=False
+            )
+        ]
     return [
         Solution(
             motion.method,
@@ -88,7 +92,8 @@ def solve(
     ]
 
 
-def _check(problem: Problem) -> None:
+def check(problem: Problem) -> None:
+    """Refuse problems that this method does not serve; raises InputError."""
     supported = "supported are r = 1, the kinetic energy, boundary free or fixed, and no limits"
     bounds = problem.bounds
     limits = np.concatenate([bounds.lower, bounds.upper, bounds.velocity, bounds.torque, bounds.power])

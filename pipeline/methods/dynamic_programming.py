@@ -112,7 +112,7 @@ def solve(
     if not kept:
         standing = np.tile(problem.q_init, (len(times), 1))
         message = "no path through the grid keeps the limits; more nodes or fewer intervals make it finer than them"
-        return [Solution("dynamic_programming", Trajectory(times, standing), Status.INFEASIBLE, message)]
+        return [Solution("dynamic_programming", Trajectory(times, standing), Status.INFEASIBLE, message, found=False)]
     progress(1, 1, float(costs[kept[0]]))
     log: dict[str, Any] = {**_errors(grid, problem.boundary, float(costs[kept[0]])), "spacing_rad": grid.spacing}
     log["loops"] = [len(layer.loops) for layer in grid.layers]
@@ -127,6 +127,19 @@ def solve(
         )
         for rank, index in enumerate(kept)
     ]
+
+
+def check(problem: Problem) -> None:
+    """Refuse problems that this method does not serve; raises InputError."""
+    if problem.task.redundancy != 1:
+        raise InputError(f"dynamic_programming: the redundancy degree is {problem.task.redundancy}; supported is r = 1")
+    if problem.objective.torque:
+        raise InputError(
+            "dynamic_programming needs an objective of first order, the kinetic energy; a torque integral is not one"
+        )
+    ends = problem.reference.position(np.array([0.0, problem.reference.duration]))
+    if problem.boundary is Boundary.CYCLIC and np.linalg.norm(ends[1] - ends[0]) > 1e-9:
+        raise InputError("boundary cyclic: the path does not end where it starts")
 
 
 def starts(problem: Problem, times: Array, nodes: int = 180, same_path: float = 0.2) -> Array:
@@ -175,15 +188,10 @@ def make_grid(problem: Problem, times: Array, nodes: int, velocity_slack: float 
 
     A joint whose position limits leave at most a turn is represented within them and cannot jump across the gap.
     """
-    if problem.objective.torque:
-        raise InputError(
-            "dynamic_programming needs an objective of first order, the kinetic energy; a torque integral is not one"
-        )
+    check(problem)
     task, bounds = problem.task, problem.bounds
     fixed, cyclic = problem.boundary is Boundary.FIXED, problem.boundary is Boundary.CYCLIC
     x = problem.reference.position(times)
-    if cyclic and np.linalg.norm(x[-1] - x[0]) > 1e-9:
-        raise InputError("boundary cyclic: the path does not end where it starts")
     wanted = x[1:] if fixed else x[:-1] if cyclic else x
     all_loops = manifolds(task, wanted, np.random.default_rng(0), nodes=nodes, seeds=problem.q_init[None])
     q = [np.concatenate([loop.q for loop in loops]) for loops in all_loops]

@@ -25,6 +25,9 @@ from pipeline.problem import Objective, Problem, Progress, Solution, Status, Tra
 from pipeline.transcription import Transcription
 
 TRACKING = 1e-8  # [m] what an optimum must keep at every knot
+# What a coarse grid's optimum needs to be told apart and refined; only the last grid's is reported.
+ROUGH_TOLERANCE = 1e-4
+ROUGH = {"constr_viol_tol": 1e-5, "acceptable_tol": 1e-4, "acceptable_constr_viol_tol": 1e-5}
 ELASTIC_STARTS = 3  # from how many motions the least violation is sought when no motion is feasible
 FEWER = 12  # starts on a finer grid after none succeeded on the coarse one
 HOPELESS = 0.1  # relative violation on a coarse grid from which on finer ones are not tried
@@ -170,7 +173,12 @@ def _optimise_start(context: tuple[Problem, Array, GlobalOptions], guess: Array)
 
 def _optimise(problem: Problem, times: Array, guess: Array, options: GlobalOptions) -> Optimum:
     program = Transcription(problem, times, guess)
-    q, outcome, iterations = program.solve(tolerance=options.tolerance, max_iterations=options.max_iterations)
+    last = len(times) == len(problem.times)
+    q, outcome, iterations = program.solve(
+        tolerance=options.tolerance if last else max(options.tolerance, ROUGH_TOLERANCE),
+        max_iterations=options.max_iterations,
+        extra=None if last else ROUGH,
+    )
     cost = float(objective_values(problem, times, q[None])[0])
     entry = {
         "intervals": len(times) - 1,
@@ -221,9 +229,9 @@ def _members(problem: Problem, optimum: Optimum, starts: list[Optimum], options:
     return int((np.abs(wrap(np.array(solved), revolute)).max(axis=(1, 2)) <= options.same_path).sum())
 
 
-def _nothing(problem: Problem, status: Status, message: str, log: dict[str, Any], q: Array | None = None) -> Solution:
-    motion = np.tile(problem.q_init, (len(problem.times), 1)) if q is None else q
-    return Solution("global", Trajectory(problem.times, motion), status, message, statistics=log)
+def _nothing(problem: Problem, status: Status, message: str, log: dict[str, Any]) -> Solution:
+    standing = np.tile(problem.q_init, (len(problem.times), 1))
+    return Solution("global", Trajectory(problem.times, standing), status, message, statistics=log, found=False)
 
 
 def _relaxed(problem: Problem, times: Array, motions: Array) -> Relaxed | None:

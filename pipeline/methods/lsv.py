@@ -22,17 +22,19 @@ def solve(problem: Problem, options: LsvOptions = LsvOptions()) -> Solution:
     x_ref, xd_ref, _ = reference.sample(time)
     watch = SingularityWatch(options.singular_value, options.max_drift)
 
-    def velocity(i: int, q: Array) -> Array:
-        x, jacobian = task.value_and_jacobian(q[None])
-        watch.see(time[i], jacobian[0])
-        command = xd_ref[i] + options.gain * (x_ref[i] - x[0])
-        return np.asarray(pseudoinverse(jacobian[0]) @ command)
+    def velocity(i: int, jacobian: Array, correction: Array) -> Array:
+        watch.see(time[i], jacobian)
+        return np.asarray(pseudoinverse(jacobian) @ (xd_ref[i] + correction))
 
     q = np.empty((steps + 1, task.arm.n))
     q[0] = problem.q_init
     for i in range(steps):
-        slope = velocity(i, q[i])
+        x, jacobian = task.value_and_jacobian(q[i][None])
+        # Once per step: the predicted point below is off by more than the drift that is to be corrected.
+        correction = options.gain * (x_ref[i] - x[0])
+        slope = velocity(i, jacobian[0], correction)
         if options.integrator == "heun":
-            slope = (slope + velocity(i + 1, q[i] + dt * slope)) / 2
+            ahead = task.jacobian((q[i] + dt * slope)[None])[0]
+            slope = (slope + velocity(i + 1, ahead, correction)) / 2
         q[i + 1] = q[i] + dt * slope
     return watch.judge("lsv", Trajectory(time, q), {"steps": steps, "integrator": options.integrator})

@@ -16,7 +16,7 @@ from scipy.interpolate import CubicSpline
 
 from pipeline.config import GlobalOptions, PmkeOptions, check
 from pipeline.methods import global_planner, pmke
-from pipeline.run import PROJECT, prepare
+from pipeline.run import prepare
 from pipeline.shooting import Window
 from pipeline.transcription import Transcription
 
@@ -54,7 +54,7 @@ def predictions() -> None:
     Window.solve = solve  # type: ignore[method-assign]
 
     window = Window(problem.task, options.horizon, options.prediction_step)
-    arm = peer.PlanarArm.from_urdf(PROJECT / "robots" / "planar3r.urdf")
+    arm = peer.PlanarArm.from_urdf(peer.ROBOT)
     program = peer.kinetic_energy_program(arm, options.horizon, options.prediction_step, options.tolerance)
     ours, theirs, gap = [], [], 0.0
     for _ in range(REPEATS):
@@ -74,7 +74,7 @@ def fine_solve() -> None:
     coarse = global_planner.refinement(problem.times, options.coarse_steps)[-2]
     rough = global_planner.solve(prepare(check({"timing": {"steps": len(coarse) - 1}})), options)[0]
     guess = CubicSpline(coarse, rough.trajectory.q)(problem.times)
-    arm = peer.PlanarArm.from_urdf(PROJECT / "robots" / "planar3r.urdf")
+    arm = peer.PlanarArm.from_urdf(peer.ROBOT)
     step = float(problem.times[1])
     program = peer.kinetic_energy_program(arm, len(problem.times) - 1, step, options.tolerance)
     path = problem.reference.position(problem.times[1:])

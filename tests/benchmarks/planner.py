@@ -21,10 +21,11 @@ from pipeline import session
 from pipeline.arrays import Array
 from pipeline.config import GlobalOptions
 from pipeline.costs import objective_values
-from pipeline.methods import dynamic_programming, global_planner
+from pipeline.methods import dynamic_programming as dynamic_programming  # so that no timed call imports it
+from pipeline.methods import global_planner
 from pipeline.methods.global_planner import Optimum
-from pipeline.problem import Boundary, Problem
-from pipeline.run import PROJECT, prepare
+from pipeline.problem import Boundary, Problem, Status
+from pipeline.run import prepare
 
 SIMULATIONS = ("sim1", "sim2", "sim3", "sim4", "sim5")
 CONVERGED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
@@ -60,7 +61,7 @@ class Peer(Side):
         super().__init__(self._solve)
         self.construction = 0.0
         self.programs: dict[tuple[int, bool, bool], peer.Program] = {}
-        self.arm = peer.PlanarArm.from_urdf(PROJECT / "robots" / "planar3r.urdf")
+        self.arm = peer.PlanarArm.from_urdf(peer.ROBOT)
 
     def program(self, problem: Problem, times: Array, options: GlobalOptions) -> peer.Program:
         limits, torque = problem.bounds, problem.objective.torque > 0
@@ -77,6 +78,7 @@ class Peer(Side):
                 {
                     "tol": options.tolerance,
                     "max_iter": options.max_iterations,
+                    "mu_init": 1e-3,
                     "bound_relax_factor": 0.0,
                     "constr_viol_tol": 1e-8,
                     "acceptable_tol": 1e-6,
@@ -96,7 +98,7 @@ class Peer(Side):
 
 def simulation(name: str) -> None:
     """One line for the multi-start, one for `starts=dynamic_programming` where that applies, and the optima of all."""
-    with initialize_config_dir(str(PROJECT / "conf"), version_base="1.3"):
+    with initialize_config_dir(str(peer.PROJECT / "conf"), version_base="1.3"):
         config = session.checked(compose("config", overrides=[f"+experiment={name}"]))
     problem, options = prepare(config), config.method.global_
     grids = global_planner.refinement(problem.times, options.coarse_steps)
@@ -118,7 +120,7 @@ def simulation(name: str) -> None:
         begin = time.perf_counter()
         solutions = global_planner.solve(problem, replace(options, starts="dynamic_programming"), config.seed)
         seconds = time.perf_counter() - begin
-        grown = np.array([solution.trajectory.q for solution in solutions if solution.statistics.get("solves")])
+        grown = np.array([solution.trajectory.q for solution in solutions if solution.status is Status.SOLVED])
         costs = objective_values(problem, problem.times, grown)
         found["dp"] = [Optimum(q, float(cost), True, "") for q, cost in zip(grown, costs, strict=True)]
         line(f"{name}, dynamic_programming", seconds, theirs.seconds, "the whole planner against the same peer")
@@ -133,11 +135,13 @@ def keep(problem: Problem, options: GlobalOptions, fine: list[Optimum]) -> list[
 
 
 def agreement(problem: Problem, program: peer.Program, found: dict[str, list[Optimum]]) -> None:
-    """Every optimum judged by the other side's formulas, and how near the two sides' optima are to each other."""
+    """Every optimum recomputed by both sides, by the peer with path and limits, and whether the lists agree."""
     everything = [optimum for optima in found.values() for optimum in optima]
     checks = [program.check(optimum.q) for optimum in everything]
     costs = objective_values(problem, problem.times, np.array([optimum.q for optimum in everything]))
     apart = max(abs(check[0] / cost - 1) for check, cost in zip(checks, costs, strict=True))
+    lists = {tuple(f"{optimum.cost:.6f}" for optimum in optima) for optima in found.values()}
+    print("  the lists agree" if len(lists) == 1 else "  THE LISTS DIFFER")
     print(f"  recomputed by both: costs within {apart:.0e}, path and limits kept to {max(c[1] for c in checks):.0e}")
 
 
@@ -149,7 +153,6 @@ def main(names: list[str]) -> None:
     unknown = set(names) - set(SIMULATIONS)
     if unknown:
         sys.exit(f"{', '.join(sorted(unknown))}: not one of {', '.join(SIMULATIONS)}")
-    np.zeros(dynamic_programming.STRIDE)
     print(HEAD)
     for name in names or SIMULATIONS:
         simulation(name)
