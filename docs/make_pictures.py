@@ -1,4 +1,4 @@
-"""`make pictures`: the README's pictures from a fresh run of trajectory 3. Needs the viewer's system libraries."""
+"""`make pictures`: the README's pictures from fresh runs of trajectory 3 and the front. Needs the viewer's system libraries."""
 
 from __future__ import annotations
 
@@ -60,6 +60,9 @@ def main() -> None:
         subprocess.run([sys.executable, "-m", "pipeline", "+experiment=traj3", f"hydra.run.dir={folder}"], check=True)
         small(Image.open(Path(folder) / "figures" / "stroboscopic.png"), DOCS / "stroboscopic.png")
         small(Image.open(Path(folder) / "figures" / "energy.png"), DOCS / "energy.png")
+        front = Path(folder) / "front"
+        subprocess.run([sys.executable, "-m", "pipeline", "+experiment=pareto", f"hydra.run.dir={front}"], check=True)
+        small(Image.open(front / "figures" / "front.png"), DOCS / "front.png")
         small(screenshot(Path(folder) / "recording.rrd", 4.0), DOCS / "recording.png")
 
 

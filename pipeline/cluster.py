@@ -6,6 +6,7 @@ A task carries everything it needs, so that the cluster can repeat it elsewhere 
 from __future__ import annotations
 
 import asyncio
+import logging
 import pickle
 import threading
 from collections.abc import Generator, Sequence
@@ -48,6 +49,7 @@ def run(address: str, function: Any, context: Any, items: Sequence[Any]) -> Gene
     from distributed import Client, as_completed
     from distributed.client import FutureCancelledError
 
+    logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # what goes wrong is raised below
     with Client(address, timeout=TIMEOUT, set_as_default=False) as client:
         tasks = [pickle.dumps((function, context, item)) for item in items]
         futures = client.map(_task, tasks, versions=stamp(), pure=False)
