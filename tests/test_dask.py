@@ -11,6 +11,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -104,13 +105,13 @@ def work(folder: Path, item: float) -> float:
     return item / 3
 
 
-def threads(folder: Path, item: int) -> tuple[int, float, float]:
+def threads(folder: Path, item: int) -> tuple[int, int, float, float]:
     from threadpoolctl import threadpool_info
 
     begin = time.monotonic()
     np.linalg.inv(np.eye(200))
     time.sleep(0.1)
-    return max(pool["num_threads"] for pool in threadpool_info()), begin, time.monotonic()
+    return max(pool["num_threads"] for pool in threadpool_info()), os.getpid(), begin, time.monotonic()
 
 
 def done_by(folder: Path, what: str) -> list[tuple[float, int]]:
@@ -146,9 +147,10 @@ def test_an_error_is_itself_and_what_was_finished_is_kept(two_workers: Cluster, 
 def test_one_solve_at_a_time_on_one_thread(two_workers: Cluster, tmp_path: Path) -> None:
     """Whatever the worker was started with: one of the two has two threads."""
     results = Workers(address=two_workers.address).map(threads, tmp_path, list(range(8)))
-    assert {count for count, _, _ in results} == {1}
-    overlapping = [sum(begin < other < end for _, other, _ in results) for _, begin, end in results]
-    assert max(overlapping) <= 1
+    assert {count for count, *_ in results} == {1}
+    for process in {process for _, process, _, _ in results}:
+        spans = sorted(span for _, worker, *span in results if worker == process)
+        assert all(end <= begin for (_, end), (begin, _) in pairwise(spans))
 
 
 def test_the_planner_gives_the_same_as_here(two_workers: Cluster, tmp_path: Path) -> None:
