@@ -16,6 +16,7 @@ from pipeline.schema import (
     choice,
     choices,
     count,
+    fixed,
     intervals,
     mapping,
     number,
@@ -51,6 +52,7 @@ class RobotConfig:
 class LineConfig:
     """`path=line`: straight, `length` m along `direction`."""
 
+    kind: str = fixed("line")
     length: float = number(0.4, above=0, unit="m")
     direction: float | list[float] = angle_or_vector(157.5)
     start: list[float] | None = numbers(None, unit="m")
@@ -60,6 +62,7 @@ class LineConfig:
 class CircleConfig:
     """`path=circle`: through the start, centre `radius` m away along `center_direction`; `angle` deg of it."""
 
+    kind: str = fixed("circle")
     radius: float = number(0.05, above=0, unit="m")
     center_direction: float | list[float] = angle_or_vector(180.0)
     clockwise: bool = switch(False)
@@ -72,6 +75,7 @@ class CircleConfig:
 class WaypointsConfig:
     """`path=waypoints`: a smooth curve through the rows of a CSV file."""
 
+    kind: str = fixed("waypoints")
     file: str = text("")
     relative: bool = switch(False)
 
@@ -90,7 +94,7 @@ class TimingConfig:
 class KineticEnergyConfig:
     """`objective=kinetic_energy`: the integral of the kinetic energy."""
 
-    kind: ClassVar[str] = "kinetic_energy"
+    kind: str = fixed("kinetic_energy")
     weights: ClassVar[tuple[float, float]] = (1.0, 0.0)
 
 
@@ -98,7 +102,7 @@ class KineticEnergyConfig:
 class TorqueConfig:
     """`objective=torque`: the integral of the squared joint torques."""
 
-    kind: ClassVar[str] = "torque"
+    kind: str = fixed("torque")
     weights: ClassVar[tuple[float, float]] = (0.0, 1.0)
 
 
@@ -106,9 +110,9 @@ class TorqueConfig:
 class WeightedConfig:
     """`objective=weighted`: a convex combination of both."""
 
+    kind: str = fixed("weighted")
     kinetic_energy: float = number(0.5, low=0, high=1)
     torque: float = number(0.5, low=0, high=1)
-    kind: ClassVar[str] = "weighted"
 
     @property
     def weights(self) -> tuple[float, float]:

@@ -185,6 +185,11 @@ def mapping(of: Check | None = None, *, optional: bool = False) -> Any:
     return _field(None, _optional(None, check)) if optional else _field({}, check)
 
 
+def fixed(word: str) -> Any:
+    """What a part chosen by `kind` is called: not to be set, but part of the record."""
+    return dataclasses.field(default=word, init=False)
+
+
 def any_number(value: Any, key: str) -> float:
     return float(_check_number(False, None, None, None, "")(value, key))
 
@@ -215,7 +220,7 @@ def build(cls: type[T], values: Any, where: str = "") -> T:
     """An instance of `cls` from a mapping; raises ConfigError that names the key and what is allowed."""
     if not isinstance(values, Mapping):
         raise _fail(where, values, "must be a table of keys and values")
-    fields = {field.name: field for field in dataclasses.fields(cls)}  # type: ignore[arg-type]
+    fields = {field.name: field for field in dataclasses.fields(cls) if field.init}  # type: ignore[arg-type]
     names = {name.rstrip("_"): name for name in fields}
     made: dict[str, Any] = {}
     for key, value in values.items():

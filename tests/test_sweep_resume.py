@@ -188,3 +188,9 @@ def test_a_killed_sweep_goes_on(sweep: Sweep, tmp_path: Path) -> None:
     for run in ("0_sim1", "1_sim1"):
         motions = [pd.read_parquet(tmp_path / name / run / "trajectories.parquet") for name in ("all", "whole")]
         pd.testing.assert_frame_equal(*motions, check_exact=True)
+
+
+def test_another_objective_in_the_same_folder_is_another_run(sweep: Sweep) -> None:
+    assert sweep("path.length=0.1,0.15", "objective=kinetic_energy").code == 0
+    assert skipped(sweep("path.length=0.1,0.15", "objective=torque")) == []
+    assert skipped(sweep("path.length=0.1,0.15", "objective=torque")) == ["0_traj1", "1_traj1"]
