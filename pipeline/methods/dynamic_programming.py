@@ -10,92 +10,21 @@ from above, and its excess, the grid error, is of second order in the node spaci
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.arrays import Array
 from pipeline.candidates import distinct
 from pipeline.config import DynamicProgrammingOptions
 from pipeline.errors import InputError
 from pipeline.kinematics import wrap
+from pipeline.manifold_grid import Grid, Index, make_grid
 from pipeline.problem import Boundary, Problem, Progress, Solution, Status, Trajectory, no_progress
-from pipeline.self_motion import manifolds
 
-Index = NDArray[np.intp]
-PAIRS = 2**16  # node pairs per batch: what stays in the processor's cache
 TRACKING = 1e-10  # [m] what every node keeps
 STRIDE = 8  # first spacing, in nodes, of the starts that a cyclic problem is solved from
-
-
-@dataclass(frozen=True)
-class Layer:
-    """The nodes of one knot: q (K, n) [rad], L (K, n, n) with M = L L', whether they are within limits (K,), loop sizes."""
-
-    q: Array
-    root: Array
-    allowed: NDArray[np.bool_]
-    loops: tuple[int, ...]
-
-    def thin(self) -> Layer:
-        """Every other node of every loop; a single node stays."""
-        if self.loops == (1,):
-            return self
-        return Layer(self.q[::2], self.root[::2], self.allowed[::2], tuple(size // 2 for size in self.loops))
-
-
-@dataclass(frozen=True)
-class Grid:
-    """The layers of all knots; `turning` (n,) are the joints whose differences are taken to the nearest turn."""
-
-    times: Array
-    layers: list[Layer]
-    turning: NDArray[np.bool_]
-    step_limit: Array  # (N, n) [rad] largest joint difference
-    spacing: float  # [rad] between nodes
-
-    def thin_nodes(self) -> Grid:
-        return replace(self, layers=[layer.thin() for layer in self.layers], spacing=2 * self.spacing)
-
-    def thin_intervals(self) -> Grid:
-        """Two intervals as one (an odd one at the end stays)."""
-        keep = np.unique([*range(0, len(self.times), 2), len(self.times) - 1])
-        limit = np.add.reduceat(self.step_limit, keep[:-1], axis=0)
-        return replace(self, times=self.times[keep], layers=[self.layers[i] for i in keep], step_limit=limit)
-
-    def steps(self, i: int, nodes: Index | None = None) -> Iterator[tuple[slice, Array]]:
-        """Costs (R, A) [J s] of interval i to R nodes at its end (all, or the given ones) from all A at its start."""
-        before, after = self.layers[i], self.layers[i + 1]
-        q, root = (after.q, after.root) if nodes is None else (after.q[nodes], after.root[nodes])
-        allowed = after.allowed if nodes is None else after.allowed[nodes]
-        factor = root / np.sqrt(2 * (self.times[i + 1] - self.times[i]))
-        start = np.where(before.allowed, 0.0, np.inf)
-        rows = max(1, PAIRS // len(before.q))
-        for first in range(0, len(q), rows):
-            part = slice(first, min(first + rows, len(q)))
-            difference = [
-                _difference(q[part, j, None], before.q[:, j], bool(turns)) for j, turns in enumerate(self.turning)
-            ]
-            cost = np.zeros((part.stop - part.start, len(before.q)))
-            for k in range(len(difference)):
-                whitened = sum(factor[part, j, k, None] * difference[j] for j in range(k, len(difference)))
-                cost += whitened * whitened
-            for j in np.flatnonzero(np.isfinite(self.step_limit[i])):
-                cost[np.abs(difference[j]) > self.step_limit[i, j]] = np.inf
-            cost += start
-            cost[~allowed[part]] = np.inf
-            yield part, cost
-
-
-def _difference(end: Array, start: Array, turning: bool) -> Array:
-    gap = end - start
-    if turning:
-        gap -= 2 * np.pi * np.rint(gap * (0.5 / np.pi))
-    return np.asarray(gap)
 
 
 def solve(
@@ -106,6 +35,7 @@ def solve(
     Torque and power limits are not part of a first-order grid: with them the costs are those of a relaxed problem.
     """
     times = _intervals(problem, options.intervals)
+    check(problem)
     grid = make_grid(problem, times, options.nodes, options.velocity_slack)
     motions, costs = paths(grid, problem.boundary)
     kept = _distinct(problem, motions, costs, options.same_path)
@@ -147,6 +77,7 @@ def starts(problem: Problem, times: Array, nodes: int = 180, same_path: float = 
 
     A velocity limit may be exceeded by one node spacing per step: the solver that starts here will keep it.
     """
+    check(problem)
     motions, costs = paths(make_grid(problem, times, nodes, velocity_slack=1.0), problem.boundary)
     return motions[_distinct(problem, motions, costs, same_path)]
 
@@ -181,41 +112,6 @@ def _errors(grid: Grid, boundary: Boundary, cost: float) -> dict[str, float]:
     drop, coarse_drop = best(grid.thin_nodes()) - cost, best(coarse.thin_nodes()) - coarse_cost
     interval_error = (coarse_cost - coarse_drop / 3) - (cost - drop / 3)
     return {"grid_error": drop, "interval_error": interval_error}
-
-
-def make_grid(problem: Problem, times: Array, nodes: int, velocity_slack: float = 0.0) -> Grid:
-    """Trace the manifolds of all knots `times` (N + 1,) and evaluate M at their nodes, once each, stacked.
-
-    A joint whose position limits leave at most a turn is represented within them and cannot jump across the gap.
-    """
-    check(problem)
-    task, bounds = problem.task, problem.bounds
-    fixed, cyclic = problem.boundary is Boundary.FIXED, problem.boundary is Boundary.CYCLIC
-    x = problem.reference.position(times)
-    wanted = x[1:] if fixed else x[:-1] if cyclic else x
-    all_loops = manifolds(task, wanted, np.random.default_rng(0), nodes=nodes, seeds=problem.q_init[None])
-    q = [np.concatenate([loop.q for loop in loops]) for loops in all_loops]
-    sizes = [tuple(len(loop.q) for loop in loops) for loops in all_loops]
-    if fixed:
-        q.insert(0, problem.q_init[None])
-        sizes.insert(0, (1,))
-
-    revolute = task.arm.description.revolute
-    held = revolute & (bounds.upper - bounds.lower <= 2 * np.pi)
-    turning = revolute & ~held
-    flat = np.concatenate(q)
-    turns = np.floor((flat - np.where(held, bounds.lower, 0.0) + 1e-9) / (2 * np.pi))
-    flat = flat - np.where(held, 2 * np.pi * turns, 0.0)
-    within = np.all(turning | ((flat <= bounds.upper + 1e-9) & (flat >= bounds.lower - 1e-9)), axis=1)
-    root = np.linalg.cholesky(task.arm.mass_matrix(flat))
-    ends = np.cumsum([len(of_knot) for of_knot in q])[:-1]
-    parts = zip(np.split(flat, ends), np.split(root, ends), np.split(within, ends), sizes, strict=True)
-    layers = [Layer(*part) for part in parts]
-    if cyclic:
-        layers.append(layers[0])
-    spacing = max(loop.length / len(loop.q) for loop in all_loops[0])
-    limit = np.diff(times)[:, None] * bounds.velocity * (1 + 1e-9) + velocity_slack * spacing
-    return Grid(times, layers, turning, limit, spacing)
 
 
 def _intervals(problem: Problem, intervals: int | None) -> Array:
