@@ -19,6 +19,7 @@ from pipeline.arm import Arm
 from pipeline.arrays import Array
 from pipeline.problem import Boundary, Problem, Solution, Status, Trajectory
 
+LIMITS = 1e-6  # relative: how well a method that promises limits must keep them at its knots
 BETWEEN = 10  # sub-intervals per knot interval on which the motion between knots is judged
 
 
@@ -49,6 +50,8 @@ class Evaluation:
     spectral_radius: Array  # (N + 1,) of M
     energy_integral_spline: float  # of the cubic spline through the knots, independent of the grid's quadrature
     tracking_error_between: float  # largest between knots, along that spline
+    limit_excess: dict[str, float]  # by kind, at the knots, relative; see limit_excess()
+    limit_excess_between: dict[str, float]  # the same along that spline
 
     @property
     def method(self) -> str:
@@ -86,11 +89,12 @@ def evaluate(problem: Problem, solution: Solution) -> Evaluation:
     tau[0] = tau[0] if problem.boundary is Boundary.CYCLIC else 0.0
     position = skeleton[:, -1]
     tracking = np.linalg.norm(position[:, task.rows] - problem.reference.position(time), axis=1)
-    spline_integral, between = _between_knots(problem, plant, trajectory, qd[0])
+    excess = limit_excess(problem, q, qd, tau)
+    spline_integral, between, excess_between = _between_knots(problem, plant, trajectory, qd[0])
 
     status, message = solution.status, solution.message
     if status is Status.SOLVED:
-        status, message = _judge(q, tracking, solution)
+        status, message = _judge(q, tracking, excess, solution)
     return Evaluation(
         solution=solution,
         status=status,
@@ -111,6 +115,8 @@ def evaluate(problem: Problem, solution: Solution) -> Evaluation:
         spectral_radius=radius,
         energy_integral_spline=spline_integral,
         tracking_error_between=between,
+        limit_excess=excess,
+        limit_excess_between=excess_between,
     )
 
 
@@ -134,7 +140,7 @@ def _running(rate: Array, dt: Array) -> Array:
     return np.concatenate([[0.0], np.cumsum(rate[1:] * dt)])
 
 
-def _judge(q: Array, tracking: Array, solution: Solution) -> tuple[Status, str]:
+def _judge(q: Array, tracking: Array, excess: dict[str, float], solution: Solution) -> tuple[Status, str]:
     if not np.all(np.isfinite(q)):
         return Status.UNCONFIRMED, "the motion holds values that are not finite"
     worst = int(np.argmax(tracking))
@@ -143,30 +149,53 @@ def _judge(q: Array, tracking: Array, solution: Solution) -> tuple[Status, str]:
             f"the end effector is {tracking[worst]:.2e} m off its path at t = {solution.trajectory.time[worst]:.2f} s; "
             f"{solution.method} promises {solution.tracking_tolerance:.0e} m"
         )
+    for kind in solution.limits_kept:
+        if excess.get(kind, 0.0) > LIMITS:
+            return Status.UNCONFIRMED, f"a {kind} limit is exceeded by {100 * excess[kind]:.2g} %"
     return Status.SOLVED, solution.message
 
 
-def _between_knots(problem: Problem, plant: _Plant, trajectory: Trajectory, qd_start: Array) -> tuple[float, float]:
-    """The kinetic-energy integral (Simpson) and the largest tracking error of the cubic spline through the knots."""
-    if not np.all(np.isfinite(trajectory.q)):
-        return float("nan"), float("nan")
-    rest = problem.reference.timing.at_rest and problem.boundary is not Boundary.CYCLIC
-    ends = ((1, qd_start), (1, np.zeros_like(qd_start))) if rest else "not-a-knot"
-    if len(trajectory.time) < 4:
-        return float("nan"), float("nan")
+def _between_knots(
+    problem: Problem, plant: _Plant, trajectory: Trajectory, qd_start: Array
+) -> tuple[float, float, dict[str, float]]:
+    """The cubic spline through the knots: kinetic-energy integral (Simpson), largest tracking error, excess of limits."""
+    if not np.all(np.isfinite(trajectory.q)) or len(trajectory.time) < 4:
+        return float("nan"), float("nan"), {}
+    # Only torques tie the first velocity to rest; the energy's sum lets it jump, and nothing prescribes the last one.
+    torque_counts = problem.objective.torque > 0 or bool(np.isfinite(problem.bounds.torque).any())
+    rest = problem.reference.timing.at_rest and problem.boundary is not Boundary.CYCLIC and torque_counts
+    ends = ((1, qd_start), "not-a-knot") if rest else "not-a-knot"
     spline = CubicSpline(trajectory.time, trajectory.q, bc_type=ends)
     rows = problem.task.rows
     fraction = np.linspace(0.0, 1.0, BETWEEN + 1)
     weights = np.array([1.0, *([4.0, 2.0] * (BETWEEN // 2))[:-1], 1.0]) / (3 * BETWEEN)
     dt = np.diff(trajectory.time)
     moments = (trajectory.time[:-1, None] + dt[:, None] * fraction).ravel()
-    q, qd, x_ref = spline(moments), spline(moments, 1), problem.reference.position(moments)
-    energy, error = np.empty(len(moments)), np.empty(len(moments))
+    q, qd, qdd, x_ref = spline(moments), spline(moments, 1), spline(moments, 2), problem.reference.position(moments)
+    energy, error, tau = np.empty(len(moments)), np.empty(len(moments)), np.zeros_like(q)
     for i in range(len(moments)):
         plant.at(q[i], qd[i])
         energy[i] = plant.kinetic_energy()
         error[i] = np.linalg.norm(plant.tip()[rows] - x_ref[i])
-    return float(energy.reshape(len(dt), -1) @ weights @ dt), float(error.max())
+        if problem.bounds.any:
+            tau[i] = plant.torque(qdd[i])
+    integral = float(energy.reshape(len(dt), -1) @ weights @ dt)
+    return integral, float(error.max()), limit_excess(problem, q, qd, tau)
+
+
+def limit_excess(problem: Problem, q: Array, qd: Array, tau: Array) -> dict[str, float]:
+    """By how much each kind of limit is exceeded, relative to its size (positions: to half the range); <= 0 if kept."""
+    limits = problem.bounds
+    if not limits.any or not np.all(np.isfinite(q)):
+        return {}
+    half = np.where(np.isfinite(limits.upper - limits.lower), (limits.upper - limits.lower) / 2, 1.0)
+    kinds = {
+        "position": (np.maximum(q - limits.upper, limits.lower - q) / half, limits.upper),
+        "velocity": (np.abs(qd) / limits.velocity - 1, limits.velocity),
+        "torque": (np.abs(tau) / limits.torque - 1, limits.torque),
+        "power": (np.abs(tau * qd) / limits.power - 1, limits.power),
+    }
+    return {kind: float(excess.max()) for kind, (excess, bound) in kinds.items() if np.isfinite(bound).any()}
 
 
 class _Plant:

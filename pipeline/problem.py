@@ -38,6 +38,7 @@ class Objective:
     torque: float = 0.0
 
 
+LIMIT_KINDS = ("position", "velocity", "torque", "power")
 INTEGRALS = ("kinetic_energy", "torque")
 
 
@@ -116,6 +117,7 @@ class Solution:
 
     `optimum` counts distinct optima of one method from 1 on. `event_time` [s] is when a singularity was met.
     `tracking_tolerance` [m] is what the method promises to keep of the path at its knots; the evaluation checks it.
+    `limits_kept` are the kinds of limits that it promises to keep at its knots.
     `found` is False where there is no motion to speak of: the trajectory then only holds the arm at its start.
     """
 
@@ -126,6 +128,7 @@ class Solution:
     optimum: int = 1
     event_time: float | None = None
     tracking_tolerance: float = np.inf
+    limits_kept: tuple[str, ...] = ()
     found: bool = True
     statistics: dict[str, Any] = field(default_factory=dict)
 

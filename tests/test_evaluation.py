@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from types import SimpleNamespace
 
@@ -13,7 +13,7 @@ from scipy.interpolate import CubicSpline
 from pipeline.arrays import Array
 from pipeline.evaluation import differences, evaluate
 from pipeline.path import ConstantSpeed, RaisedCosine, Timing
-from pipeline.problem import Boundary, Problem, Solution, Status, Trajectory
+from pipeline.problem import Boundary, Limits, Objective, Problem, Solution, Status, Trajectory
 from pipeline.task import PositionTask
 from pipeline.transcription import Transcription
 
@@ -40,9 +40,12 @@ def knots(rng: np.random.Generator, q_init: Array) -> Array:
 
 
 def traced(task: PositionTask, knots: Array, at_rest: bool) -> Problem:
-    ends = "clamped" if at_rest else "not-a-knot"
+    """A torque problem from rest, which ties the first velocity, or an energy problem entered at speed."""
+    ends = ((1, np.zeros(3)), "not-a-knot") if at_rest else "not-a-knot"
     timing = RaisedCosine(3.0) if at_rest else ConstantSpeed(3.0)
-    return Problem(task, Traced(task, CubicSpline(TIME, knots, bc_type=ends), timing), knots[0], TIME)  # type: ignore[arg-type]
+    objective = Objective(0.0, 1.0) if at_rest else Objective()
+    reference = Traced(task, CubicSpline(TIME, knots, bc_type=ends), timing)
+    return Problem(task, reference, knots[0], TIME, objective=objective)  # type: ignore[arg-type]
 
 
 def solution(knots: Array, tolerance: float = 1e-8, status: Status = Status.SOLVED) -> Solution:
@@ -155,3 +158,21 @@ def test_the_published_optima(problem: Make, guess: Guess, number: int, publishe
     assert got.energy_integral[-1] == pytest.approx(published, rel=2e-4)
     # The backward sum on the grid and Simpson's rule along the spline are two roads to one integral.
     assert got.energy_integral_spline == pytest.approx(got.energy_integral[-1], rel=1e-2)
+
+
+def test_a_promised_limit_that_is_exceeded_is_said(task: PositionTask, knots: Array) -> None:
+    asked = traced(task, knots, at_rest=True)
+    free = evaluate(asked, solution(knots))
+    assert free.limit_excess == {}
+    peak, torque = np.abs(free.qd).max(axis=0), np.abs(free.tau).max(axis=0)
+    limits = replace(
+        Limits.none(3), velocity=peak / 1.1, torque=2 * torque, upper=knots.max(axis=0), lower=knots.min(axis=0)
+    )
+    promising = replace(solution(knots), limits_kept=("velocity",))
+    got = evaluate(replace(asked, limits=limits), promising)
+    assert got.limit_excess["velocity"] == pytest.approx(0.1)
+    assert got.limit_excess["torque"] == pytest.approx(-0.5)
+    assert got.limit_excess["position"] == pytest.approx(0.0, abs=1e-12)
+    assert got.limit_excess_between["position"] > 0.0
+    assert (got.status, got.message) == (Status.UNCONFIRMED, "a velocity limit is exceeded by 10 %")
+    assert evaluate(replace(asked, limits=limits), solution(knots)).status is Status.SOLVED

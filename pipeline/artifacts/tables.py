@@ -69,6 +69,8 @@ def _row(e: Evaluation) -> dict[str, Any]:
     }
     for name, values in (("velocity", e.qd), ("torque", e.tau), ("power", e.power)):
         row |= {f"peak_{name}_{j + 1}": peak for j, peak in enumerate(np.abs(values).max(axis=0))}
+    for suffix, excess in (("", e.limit_excess), ("_between", e.limit_excess_between)):
+        row |= {f"{kind}_limit_excess{suffix}": value for kind, value in excess.items()}
     row |= {
         "min_singular_value": e.singular_value.min(),
         "min_spectral_radius": e.spectral_radius[radius],

@@ -21,7 +21,7 @@ from pipeline.costs import objective_values
 from pipeline.feasibility import Relaxed, least_violation
 from pipeline.kinematics import wrap
 from pipeline.parallel import Workers
-from pipeline.problem import Objective, Problem, Progress, Solution, Status, Trajectory, no_progress
+from pipeline.problem import LIMIT_KINDS, Objective, Problem, Progress, Solution, Status, Trajectory, no_progress
 from pipeline.transcription import Transcription
 
 TRACKING = 1e-8  # [m] what an optimum must keep at every knot
@@ -96,6 +96,7 @@ def solve(
                 Status.SOLVED,
                 optimum=rank + 1,
                 tracking_tolerance=TRACKING,
+                limits_kept=LIMIT_KINDS,
                 statistics={**(log if rank == 0 else {}), **members},
             )
         )

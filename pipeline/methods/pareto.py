@@ -23,7 +23,17 @@ from pipeline.costs import integrals
 from pipeline.methods import global_planner
 from pipeline.methods.global_planner import TRACKING
 from pipeline.parallel import Workers
-from pipeline.problem import IntegralBounds, Objective, Problem, Progress, Solution, Status, Trajectory, no_progress
+from pipeline.problem import (
+    LIMIT_KINDS,
+    IntegralBounds,
+    Objective,
+    Problem,
+    Progress,
+    Solution,
+    Status,
+    Trajectory,
+    no_progress,
+)
 from pipeline.transcription import Transcription
 
 SAME_CLASS = 0.6  # [rad] neighbouring points of one class of paths differ by less at every knot
@@ -201,6 +211,7 @@ def _report(problem: Problem, points: Sequence[Point], options: ParetoOptions) -
                     Status.SOLVED,
                     optimum=rank + 1,
                     tracking_tolerance=TRACKING,
+                    limits_kept=LIMIT_KINDS,
                 )
             )
     solutions[0].statistics.update({"front": rows, "objectives": list(options.objectives)})
