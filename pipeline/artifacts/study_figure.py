@@ -29,7 +29,7 @@ def draw(study: Study, name: str) -> Figure:
         law = np.exp(intercept) * tail**exponent
         axes.loglog(tail, law, line, label=f"{label}: $e^{{{intercept:.3f}}} N^{{{exponent:.3f}}}$")
     axes.axvline(study.parameters, color="0.7", linewidth=1.0)
-    axes.annotate(f" {study.parameters} parameters", (study.parameters, study.distance.max()), color="0.4")
+    axes.annotate(f" {study.parameters} parameters", (study.parameters, study.distance.min()), color="0.4")
     axes.set(xlabel="Number of candidates $N$", ylabel="Best candidate above the optimum [J s]", title=name)
     axes.grid(True, which="both", color="0.93")
     axes.legend()
