@@ -12,11 +12,12 @@ import numpy as np
 import pytest
 from hypothesis import settings
 
-from pipeline import urdf
+from pipeline import config, urdf
 from pipeline.arm import Arm
 from pipeline.arrays import Array
 from pipeline.kinematics import project
 from pipeline.path import Line, RaisedCosine, Reference, circle, direction_vector
+from pipeline.prepare import prepare
 from pipeline.problem import Problem
 from pipeline.task import PositionTask
 
@@ -127,3 +128,17 @@ def differences(function: Callable[[Array], Array], x: Array, step: float = 1e-6
     """Central differences of function((k,)) -> (...): (..., k)."""
     columns = [(function(x + step * e) - function(x - step * e)) / (2 * step) for e in np.eye(len(x))]
     return np.stack(columns, axis=-1)
+
+
+def free_line(intervals: int) -> Problem:
+    """Simulation 1 of the Global paper: 0.40 m in 1 s, free start at rest, on so many intervals."""
+    timing = {"duration": 1.0, "steps": intervals}
+    return prepare(config.check({"boundary": {"kind": "free"}, "path": {"kind": "line"}, "timing": timing}))
+
+
+def backward_differences(problem: Problem, times: Array, motions: Array) -> Array:
+    """sum_i 1/2 qd_i' M(q_i) qd_i dt_i of each motion (P, N + 1, n)."""
+    dt = np.diff(times)
+    velocity = np.diff(motions, axis=1) / dt[:, None]
+    energy = problem.task.arm.kinetic_energy(motions[:, 1:].reshape(-1, 3), velocity.reshape(-1, 3))
+    return energy.reshape(len(motions), -1) @ dt

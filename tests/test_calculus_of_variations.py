@@ -7,14 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from conftest import backward_differences, free_line
 from scipy.integrate import solve_ivp
 
-from pipeline import urdf
-from pipeline.arm import Arm
 from pipeline.errors import InputError
 from pipeline.kinematics import project
 from pipeline.methods.calculus_of_variations import CalculusOfVariationsOptions, solve
-from pipeline.path import Line, RaisedCosine, Reference, direction_vector
 from pipeline.problem import Boundary, Limits, Objective, Problem, Solution
 from pipeline.self_motion import tangent
 from pipeline.task import PositionTask
@@ -23,21 +21,9 @@ ROBOT = Path(__file__).parents[1] / "robots" / "planar3r.urdf"
 Q_INIT = np.array([0.0, 0.327, -0.754])
 
 
-def backward_differences(problem: Problem, times: np.ndarray, motions: np.ndarray) -> np.ndarray:
-    """sum_i 1/2 qd_i' M(q_i) qd_i dt_i of each motion (P, N + 1, n)."""
-    dt = np.diff(times)
-    velocity = np.diff(motions, axis=1) / dt[:, None]
-    energy = problem.task.arm.kinetic_energy(motions[:, 1:].reshape(-1, 3), velocity.reshape(-1, 3))
-    return energy.reshape(len(motions), -1) @ dt
-
-
 @pytest.fixture(scope="module")
 def line() -> Problem:
-    """Global paper, simulation 1."""
-    task = PositionTask(Arm(urdf.read(ROBOT, "tip")))
-    start = task.value(Q_INIT[None])[0]
-    reference = Reference(Line(start, direction_vector(157.5, 2), 0.4), RaisedCosine(1.0))
-    return Problem(task, reference, Q_INIT, np.linspace(0, 1, 101), boundary=Boundary.FREE)
+    return free_line(100)
 
 
 @pytest.fixture(scope="module")

@@ -2,27 +2,18 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from conftest import free_line
 
-from pipeline import config
 from pipeline.candidate_study import Study, study
 from pipeline.config import CandidateStudyConfig, GlobalOptions
 from pipeline.problem import Problem
-from pipeline.run import prepare
 
 OPTIMUM = 0.049  # [J s] just below the optimum on this coarse grid
 
 
 @pytest.fixture(scope="module")
 def line() -> Problem:
-    return prepare(
-        config.check(
-            {
-                "boundary": {"kind": "free"},
-                "path": {"kind": "line", "length": 0.4},
-                "timing": {"duration": 1.0, "steps": 12},
-            }
-        )
-    )
+    return free_line(12)
 
 
 @pytest.fixture(scope="module")

@@ -4,26 +4,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from conftest import free_line
 
-from pipeline import certificate, config
+from pipeline import certificate
 from pipeline.config import DynamicProgrammingOptions, GlobalOptions
 from pipeline.methods import dynamic_programming, global_planner
 from pipeline.problem import Problem, Solution, Status, Trajectory
-from pipeline.run import prepare
 
 
 @pytest.fixture(scope="module")
 def line() -> Problem:
-    """Simulation 1 of the Global paper on few knots."""
-    return prepare(
-        config.check(
-            {
-                "boundary": {"kind": "free"},
-                "path": {"kind": "line", "length": 0.4},
-                "timing": {"duration": 1.0, "steps": 26},
-            }
-        )
-    )
+    return free_line(26)
 
 
 @pytest.fixture(scope="module")
