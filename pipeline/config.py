@@ -178,7 +178,7 @@ class GlobalOptions:
     candidates: int | None = count(None)
     optimised: int = count(48)
     limit_weight: float = number(0.01, low=0)
-    coarse_steps: int = count(13, low=2)
+    coarse_steps: int = count(12, low=2)
     tolerance: float = number(1e-8, above=0)
     max_iterations: int = count(300)
     same_path: float = number(0.05, above=0, unit="rad")

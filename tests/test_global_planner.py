@@ -68,12 +68,12 @@ def assert_sound(problem: Problem, motions: list[Evaluation]) -> None:
 @pytest.mark.parametrize(
     ("intervals", "coarse", "sizes"),
     [
-        (100, 13, [13, 25, 50, 100]),
-        (100, 12, [7, 13, 25, 50, 100]),
+        (100, 13, [12, 25, 50, 100]),
+        (100, 11, [6, 12, 25, 50, 100]),
         (13, 13, [13]),
         (14, 13, [7, 14]),
         (2, 13, [2]),
-        (101, 2, [2, 4, 7, 13, 26, 51, 101]),
+        (101, 2, [2, 3, 6, 12, 25, 50, 101]),
     ],
 )
 def test_grids_double_until_the_wanted_knots(intervals: int, coarse: int, sizes: list[int]) -> None:
@@ -146,16 +146,16 @@ def test_more_limits_never_cost_less() -> None:
 def test_statistics_tell_how_the_optima_were_found() -> None:
     _, motions = solved("+experiment=sim5", *FEW)
     log = motions[0].solution.statistics
-    assert log["grids"] == [13, 25, 50, 100]
+    assert log["grids"] == [12, 25, 50, 100]
     assert len(log["starts"]) <= 12
     members = [motion.solution.statistics["starts_in_basin"] for motion in motions]
     assert all(count >= 1 for count in members)
     assert sum(members) <= sum(start["converged"] for start in log["starts"])
-    assert [solve["intervals"] for solve in log["starts"][0]["solves"]] == [13]
-    assert [solve["intervals"] for solve in motions[0].solution.statistics["solves"]] == [13, 25, 50, 100]
+    assert [solve["intervals"] for solve in log["starts"][0]["solves"]] == [12]
+    assert [solve["intervals"] for solve in motions[0].solution.statistics["solves"]] == [12, 25, 50, 100]
 
 
-COARSE = ("+experiment=sim1", "timing.steps=13", *(f"method.global.{k}" for k in ("configurations=8", "candidates=80")))
+COARSE = ("+experiment=sim1", "timing.steps=12", *(f"method.global.{k}" for k in ("configurations=8", "candidates=80")))
 
 
 @pytest.mark.parametrize(

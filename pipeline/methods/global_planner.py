@@ -27,6 +27,7 @@ from pipeline.transcription import Transcription
 TRACKING = 1e-8  # [m] what an optimum must keep at every knot
 # What a coarse grid's optimum needs to be told apart and refined; only the last grid's is reported.
 ROUGH_TOLERANCE = 1e-4
+ROUGH_ITERATIONS = 120  # starts that succeed take 10 to 100
 ROUGH = {"constr_viol_tol": 1e-5, "acceptable_tol": 1e-4, "acceptable_constr_viol_tol": 1e-5}
 ELASTIC_STARTS = 3  # from how many motions the least violation is sought when no motion is feasible
 FEWER = 12  # starts on a finer grid after none succeeded on the coarse one
@@ -108,7 +109,7 @@ def refinement(times: Array, coarse_steps: int) -> list[Array]:
     intervals = len(times) - 1
     sizes = [intervals]
     while sizes[0] > coarse_steps:
-        sizes.insert(0, (sizes[0] + 1) // 2)
+        sizes.insert(0, max(2, sizes[0] // 2))
     place = np.arange(intervals + 1)
     return [np.interp(np.linspace(0, intervals, size + 1), place, times) for size in sizes]
 
@@ -177,7 +178,7 @@ def _optimise(problem: Problem, times: Array, guess: Array, options: GlobalOptio
     last = len(times) == len(problem.times)
     q, outcome, iterations = program.solve(
         tolerance=options.tolerance if last else max(options.tolerance, ROUGH_TOLERANCE),
-        max_iterations=options.max_iterations,
+        max_iterations=options.max_iterations if last else min(options.max_iterations, ROUGH_ITERATIONS),
         extra=None if last else ROUGH,
     )
     cost = float(objective_values(problem, times, q[None])[0])
