@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import io
+import os
+import signal
 import socket
 import subprocess
 import sys
@@ -33,7 +35,12 @@ def screenshot(recording: Path, at: float) -> Image.Image:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
     command = [sys.executable, "-m", "rerun", "--headless", "--bind", "127.0.0.1", "--port", str(port)]
-    viewer = subprocess.Popen([*command, "--hide-welcome-screen"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    viewer = subprocess.Popen(
+        [*command, "--hide-welcome-screen"],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )
     try:
         for _ in range(100):
             with socket.socket() as probe:
@@ -51,7 +58,7 @@ def screenshot(recording: Path, at: float) -> Image.Image:
             time.sleep(0.5)
         return Image.open(io.BytesIO(now))
     finally:
-        viewer.terminate()
+        os.killpg(viewer.pid, signal.SIGTERM)  # the command is a wrapper: the viewer is its child
         viewer.wait()
 
 

@@ -252,7 +252,9 @@ def viewer() -> Iterator[ViewerClient]:
         port = free.getsockname()[1]
     # Not ViewerClient.spawn: that listens on every interface.
     command = [RERUN, "--headless", "--bind", "127.0.0.1", "--port", str(port), "--hide-welcome-screen"]
-    process = subprocess.Popen(command, env=QUIET, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    process = subprocess.Popen(
+        command, env=QUIET, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
+    )
     try:
         deadline = time.monotonic() + 30
         while True:
@@ -264,7 +266,7 @@ def viewer() -> Iterator[ViewerClient]:
             time.sleep(0.1)
         yield ViewerClient(f"rerun+http://127.0.0.1:{port}/proxy")
     finally:
-        process.terminate()
+        os.killpg(process.pid, signal.SIGTERM)  # the command is a wrapper: the viewer is its child
         process.wait(10)
 
 
