@@ -33,8 +33,7 @@ class _Stack:
         plant.mutable_gravity_field().set_gravity_vector(np.zeros(3))
         parser = Parser(plant)
         parser.SetAutoRenaming(True)
-        self.tips, self.links = [], []
-        order: list[int] = []
+        self.tips, joints = [], []
         for _ in range(size):
             (model,) = parser.AddModelsFromString(description.xml, "urdf")
             if description.base != "world":  # which Drake takes for its own world
@@ -43,25 +42,16 @@ class _Stack:
             if np.any(offset):
                 tip = plant.AddFrame(FixedOffsetFrame("end_effector_point", tip, RigidTransform(offset), model))
             self.tips.append(tip)
-            self.links.append([plant.GetJointByName(name, model).frame_on_child() for name in description.joints])
+            joints += [plant.GetJointByName(name, model) for name in description.joints]
         plant.Finalize()
-        for model_links in self.links:
-            order += [self._joint_position(plant, frame) for frame in model_links]
+        order = [joint.position_start() for joint in joints]
         # The copies are chains, so Drake numbers their positions as we stack them; everything below relies on it.
-        assert order == list(range(size * len(description.joints))), order
+        assert order == list(range(len(joints))), order
         self.size, self.n = size, len(description.joints)
         self.plant, self.context = plant, plant.CreateDefaultContext()
         self.no_forces = MultibodyForces(plant)
         self.world = plant.world_frame()
         self.zero = np.zeros(size * self.n)
-
-    @staticmethod
-    def _joint_position(plant: MultibodyPlant, child: Any) -> int:
-        for index in plant.GetJointIndices(child.model_instance()):
-            joint = plant.get_joint(index)
-            if joint.num_positions() and joint.frame_on_child().index() == child.index():
-                return int(joint.position_start())
-        raise AssertionError("every moving joint has a position")
 
     def at(self, q: Array, qd: Array | None = None) -> None:
         self.plant.SetPositions(self.context, q.ravel())
@@ -139,20 +129,6 @@ class Arm:
             return np.array(rows).reshape(stack.size, 3)
 
         return self._map(one, q, qd)
-
-    def joint_positions(self, q: Array) -> Array:
-        """Origins of the n joints and of the end effector (K, n + 1, 3) [m]: the stick figure."""
-
-        def one(stack: _Stack, q: Array) -> Array:
-            stack.at(q)
-            return np.array(
-                [
-                    [frame.CalcPoseInWorld(stack.context).translation() for frame in (*links, tip)]
-                    for links, tip in zip(stack.links, stack.tips, strict=True)
-                ]
-            )
-
-        return self._map(one, q)
 
     # --- dynamics -----------------------------------------------------------------------------------------------
 

@@ -162,7 +162,6 @@ def test_stacks_of_any_size_agree_with_one_by_one(any_arm: Arm, count: int, rng:
     calls = [
         (any_arm.position, q),
         (any_arm.jacobian, q),
-        (any_arm.joint_positions, q),
         (any_arm.mass_matrix, q),
         (any_arm.jacobian_rate_term, q, qd),
         (any_arm.bias, q, qd),
@@ -173,13 +172,6 @@ def test_stacks_of_any_size_agree_with_one_by_one(any_arm: Arm, count: int, rng:
         np.testing.assert_allclose(method(*arguments), singly, atol=1e-11, err_msg=method.__name__)
     singly = np.concatenate([_joined(any_arm, q[k : k + 1], qd[k : k + 1], qdd[k : k + 1]) for k in range(count)])
     np.testing.assert_allclose(_joined(any_arm, q, qd, qdd), singly, atol=1e-7)
-
-
-def test_stick_figure_has_the_link_lengths_and_ends_at_the_end_effector(arm: Arm, peer: SimpleNamespace) -> None:
-    q = np.array([[0.3, -0.7, 1.1]])
-    points = arm.joint_positions(q)[0]
-    np.testing.assert_allclose(np.linalg.norm(np.diff(points, axis=0), axis=1), peer.arm.length, atol=1e-15)
-    np.testing.assert_array_equal(points[-1], arm.position(q)[0])
 
 
 def test_a_pickled_arm_gives_the_same_numbers(spatial: Arm, rng: np.random.Generator) -> None:

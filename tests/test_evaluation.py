@@ -74,6 +74,7 @@ def test_every_quantity_equals_the_formulas_written_out(
     smallest = np.sqrt(np.linalg.eigvalsh(peer.jacobian(knots) @ peer.jacobian(knots).mT)[:, 0])
     np.testing.assert_allclose(got.singular_value, smallest, rtol=1e-8)
     np.testing.assert_allclose(np.linalg.norm(np.diff(got.skeleton, axis=1), axis=2), np.tile(peer.arm.length, (7, 1)))
+    np.testing.assert_allclose(got.skeleton[:, -1], task.arm.position(knots), atol=1e-13)
     assert got.confirmed
     assert (got.status, got.message, got.label) == (Status.SOLVED, "as it was", "global")
 
