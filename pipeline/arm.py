@@ -130,6 +130,27 @@ class Arm:
 
         return self._map(one, q, qd)
 
+    def spatial_jacobian(self, q: Array) -> Array:
+        """Angular and translational Jacobians (K, 6, n) of the end effector in the world [rad/rad, m/rad], in that order."""
+
+        def one(stack: _Stack, q: Array) -> Array:
+            stack.at(q)
+            return self._jacobians(stack, spatial=True)
+
+        return self._map(one, q)
+
+    def jacobian_gradient(self, q: Array) -> Array:
+        """d J_ij / d q_k (K, 3, n, n) of the translational Jacobian [m/rad^2], exact and symmetric in j, k.
+
+        An earlier joint a turns whatever a later joint b does to the end effector: d J_b / d q_a = w_a x J_b, with w_a
+        the angular Jacobian's column (zero for a sliding joint).
+        """
+        both = self.spatial_jacobian(q)
+        turning, moving = both[:, :3].swapaxes(1, 2), both[:, 3:].swapaxes(1, 2)
+        product = np.cross(turning[:, :, None], moving[:, None])  # (K, a, b, 3), right for a <= b
+        earlier = np.tri(self.n, dtype=bool).T[:, :, None]
+        return np.ascontiguousarray(np.where(earlier, product, product.swapaxes(1, 2)).transpose(0, 3, 1, 2))
+
     # --- dynamics -----------------------------------------------------------------------------------------------
 
     def mass_matrix(self, q: Array) -> Array:
@@ -235,9 +256,9 @@ class Arm:
         return out
 
     @staticmethod
-    def _jacobians(stack: _Stack) -> Array:
-        n, zero = stack.n, np.zeros(3)
-        jacobian = stack.plant.CalcJacobianTranslationalVelocity
+    def _jacobians(stack: _Stack, spatial: bool = False) -> Array:
+        n, zero, plant = stack.n, np.zeros(3), stack.plant
+        jacobian = plant.CalcJacobianSpatialVelocity if spatial else plant.CalcJacobianTranslationalVelocity
         return np.array(
             [
                 jacobian(stack.context, JacobianWrtVariable.kV, tip, zero, stack.world, stack.world)[

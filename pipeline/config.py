@@ -29,7 +29,7 @@ from pipeline.schema import (
     text,
 )
 
-METHODS = ("lsv", "pmke", "global", "dynamic_programming", "calculus_of_variations", "pareto")
+METHODS = ("lsv", "pmke", "global", "dynamic_programming", "calculus_of_variations", "pontryagin", "pareto")
 INTEGRALS = ("kinetic_energy", "torque")
 DEFAULT_METHODS = ("lsv", "pmke", "global")
 
@@ -91,32 +91,52 @@ class TimingConfig:
 
 
 @dataclass(frozen=True)
-class KineticEnergyConfig:
+class SecondaryConfig:
+    """What every objective can have beside it: k0 times a criterion that is to be large."""
+
+    secondary: str = choice("none", "none", "manipulability", "joint_centering", "both")
+    k0: float = number(1.0, low=0)
+
+    @property
+    def criteria(self) -> tuple[str, ...]:
+        return {"none": (), "both": ("manipulability", "joint_centering")}.get(self.secondary, (self.secondary,))
+
+
+@dataclass(frozen=True)
+class KineticEnergyConfig(SecondaryConfig):
     """`objective=kinetic_energy`: the integral of the kinetic energy."""
 
     kind: str = fixed("kinetic_energy")
-    weights: ClassVar[tuple[float, float]] = (1.0, 0.0)
+    weights: ClassVar[tuple[float, float, float]] = (1.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
-class TorqueConfig:
+class TorqueConfig(SecondaryConfig):
     """`objective=torque`: the integral of the squared joint torques."""
 
     kind: str = fixed("torque")
-    weights: ClassVar[tuple[float, float]] = (0.0, 1.0)
+    weights: ClassVar[tuple[float, float, float]] = (0.0, 1.0, 0.0)
 
 
 @dataclass(frozen=True)
-class WeightedConfig:
-    """`objective=weighted`: a convex combination of both."""
+class VelocityNormConfig(SecondaryConfig):
+    """`objective=velocity_norm`: the integral of the squared joint velocities."""
+
+    kind: str = fixed("velocity_norm")
+    weights: ClassVar[tuple[float, float, float]] = (0.0, 0.0, 1.0)
+
+
+@dataclass(frozen=True)
+class WeightedConfig(SecondaryConfig):
+    """`objective=weighted`: a convex combination of kinetic energy and squared torques."""
 
     kind: str = fixed("weighted")
     kinetic_energy: float = number(0.5, low=0, high=1)
     torque: float = number(0.5, low=0, high=1)
 
     @property
-    def weights(self) -> tuple[float, float]:
-        return self.kinetic_energy, self.torque
+    def weights(self) -> tuple[float, float, float]:
+        return self.kinetic_energy, self.torque, 0.0
 
 
 @dataclass(frozen=True)
@@ -206,6 +226,20 @@ class CalculusOfVariationsOptions:
 
 
 @dataclass(frozen=True)
+class PontryaginOptions:
+    """The maximum principle: as the report prints it, and its correct two-point boundary-value problem."""
+
+    formulation: str = choice("boundary_value", "as_printed", "boundary_value", "both")
+    dt: float = number(0.01, above=0, unit="s")
+    max_drift: float = number(0.1, above=0, unit="m")
+    guesses: int = count(24)
+    intervals: int = count(40, low=4)
+    tolerance: float = number(1e-9, above=0)
+    max_nodes: int = count(4000, low=10)
+    same_path: float = number(0.01, above=0, unit="rad")
+
+
+@dataclass(frozen=True)
 class ParallelConfig:
     """Group `parallel`: how independent solves are spread."""
 
@@ -229,6 +263,7 @@ class MethodConfig:
     global_: GlobalOptions = part(GlobalOptions)
     dynamic_programming: DynamicProgrammingOptions = part(DynamicProgrammingOptions)
     calculus_of_variations: CalculusOfVariationsOptions = part(CalculusOfVariationsOptions)
+    pontryagin: PontryaginOptions = part(PontryaginOptions)
 
 
 @dataclass(frozen=True)
@@ -273,8 +308,14 @@ class RunConfig:
         {"line": LineConfig, "circle": CircleConfig, "waypoints": WaypointsConfig}, "line"
     )
     timing: TimingConfig = part(TimingConfig)
-    objective: KineticEnergyConfig | TorqueConfig | WeightedConfig = one_of(
-        {"kinetic_energy": KineticEnergyConfig, "torque": TorqueConfig, "weighted": WeightedConfig}, "kinetic_energy"
+    objective: KineticEnergyConfig | TorqueConfig | VelocityNormConfig | WeightedConfig = one_of(
+        {
+            "kinetic_energy": KineticEnergyConfig,
+            "torque": TorqueConfig,
+            "velocity_norm": VelocityNormConfig,
+            "weighted": WeightedConfig,
+        },
+        "kinetic_energy",
     )
     limits: LimitsConfig = part(LimitsConfig)
     boundary: BoundaryConfig = part(BoundaryConfig)

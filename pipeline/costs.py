@@ -10,15 +10,21 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.arrays import Array
+from pipeline.lagrangian import Lagrangian
 from pipeline.problem import Boundary, Problem
 
 
 @dataclass(frozen=True)
 class Costs:
-    """kinetic_energy [J s], torque [N^2 m^2 s]: the integrals. tau (N + 1, n) [N m], zero at the first knot."""
+    """kinetic_energy [J s], torque [N^2 m^2 s], velocity_norm [rad^2/s]: the integrals; gain: of k0 w.
+
+    tau (N + 1, n) [N m], zero at the first knot.
+    """
 
     kinetic_energy: float
     torque: float
+    velocity_norm: float
+    gain: float
     tau: Array
 
 
@@ -36,14 +42,16 @@ def velocities(problem: Problem, times: Array, q: Array) -> Array:
 
 
 def integrals(problem: Problem, times: Array, q: Array) -> Costs:
-    """Both integrals of one motion q (N + 1, n)."""
+    """All integrals of one motion q (N + 1, n)."""
     dt = np.diff(times)
     qd = velocities(problem, times, q)
     qdd = np.diff(qd, axis=0) / dt[:, None]
     arm = problem.task.arm
     tau = arm.inverse_dynamics(q[1:], qd[1:], qdd)
     energy = arm.kinetic_energy(q[1:], qd[1:])
-    return Costs(float(energy @ dt), float((tau**2).sum(axis=1) @ dt), np.vstack([np.zeros(arm.n), tau]))
+    gain = float(Lagrangian(problem.task, problem.objective).gain_integrals(times, q[None])[0])
+    squares = [float((values**2).sum(axis=1) @ dt) for values in (tau, qd[1:])]
+    return Costs(float(energy @ dt), squares[0], squares[1], gain, np.vstack([np.zeros(arm.n), tau]))
 
 
 def objective_values(problem: Problem, times: Array, motions: Array) -> Array:
@@ -53,10 +61,10 @@ def objective_values(problem: Problem, times: Array, motions: Array) -> Array:
     count, knots, n = motions.shape
     arm, weights = problem.task.arm, problem.objective
     flat_q, flat_qd = motions[:, 1:].reshape(-1, n), qd[:, 1:].reshape(-1, n)
-    total = np.zeros(count)
-    if weights.kinetic_energy > 0:
-        energy = arm.kinetic_energy(flat_q, flat_qd)
-        total += weights.kinetic_energy * (energy.reshape(count, knots - 1) @ dt)
+    lagrangian = Lagrangian(problem.task, weights)
+    total = -lagrangian.gain_integrals(times, motions)
+    if lagrangian.is_quadratic:
+        total += lagrangian.quadratic(flat_q, flat_qd).reshape(count, knots - 1) @ dt
     if weights.torque > 0:
         qdd = np.diff(qd, axis=1) / dt[:, None]
         tau = arm.inverse_dynamics(flat_q, flat_qd, qdd.reshape(-1, n))

@@ -46,6 +46,10 @@ class Evaluation:
     kinetic_energy: Array  # (N + 1,) T
     energy_integral: Array  # (N + 1,) of T, running
     torque_integral: Array  # (N + 1,) of tau'tau, running
+    velocity_norm_integral: Array  # (N + 1,) of qd'qd, running
+    secondary: Array  # (N + 1,) w, the sum of the objective's secondary criteria; zero without one
+    objective: float  # the weighted sum of the integrals, less k0 times the trapezoidal integral of w
+    objective_spline: float  # the same of the cubic spline through the knots; nan if torques count
     singular_value: Array  # (N + 1,) smallest of the task Jacobian
     spectral_radius: Array  # (N + 1,) of M
     energy_integral_spline: float  # of the cubic spline through the knots, independent of the grid's quadrature
@@ -90,7 +94,10 @@ def evaluate(problem: Problem, solution: Solution) -> Evaluation:
     position = skeleton[:, -1]
     tracking = np.linalg.norm(position[:, task.rows] - problem.reference.position(time), axis=1)
     excess = limit_excess(problem, q, qd, tau)
-    spline_integral, between, excess_between = _between_knots(problem, plant, trajectory, qd[0])
+    spline_integral, spline_objective, between, excess_between = _between_knots(problem, plant, trajectory, qd[0])
+    secondary = np.array([plant.secondary(problem, qi) for qi in q]) if problem.objective.secondary else np.zeros(count)
+    energy_integral, torque_integral = _running(energy, dt), _running((tau**2).sum(axis=1), dt)
+    velocity_norm_integral = _running((qd**2).sum(axis=1), dt)
 
     status, message = solution.status, solution.message
     if status is Status.SOLVED:
@@ -109,8 +116,18 @@ def evaluate(problem: Problem, solution: Solution) -> Evaluation:
         skeleton=skeleton,
         tracking_error=tracking,
         kinetic_energy=energy,
-        energy_integral=_running(energy, dt),
-        torque_integral=_running((tau**2).sum(axis=1), dt),
+        energy_integral=energy_integral,
+        torque_integral=torque_integral,
+        velocity_norm_integral=velocity_norm_integral,
+        secondary=secondary,
+        objective=_weighted(
+            problem,
+            float(energy_integral[-1]),
+            float(torque_integral[-1]),
+            float(velocity_norm_integral[-1]),
+            float(np.trapezoid(secondary, time)),
+        ),
+        objective_spline=spline_objective,
         singular_value=singular,
         spectral_radius=radius,
         energy_integral_spline=spline_integral,
@@ -136,6 +153,14 @@ def differences(trajectory: Trajectory, boundary: Boundary, at_rest: bool) -> tu
     return qd, np.vstack([change[-1] if boundary is Boundary.CYCLIC else np.zeros_like(first), change])
 
 
+def _weighted(problem: Problem, energy: float, torque: float, norm: float, secondary: float) -> float:
+    """The objective from its integrals; a term without weight does not count, even where it is not known."""
+    weights = problem.objective
+    k0 = weights.secondary.k0 if weights.secondary else 0.0
+    terms = ((weights.kinetic_energy, energy), (weights.torque, torque), (weights.velocity_norm, norm), (-k0, secondary))
+    return sum(weight * term for weight, term in terms if weight)
+
+
 def _running(rate: Array, dt: Array) -> Array:
     return np.concatenate([[0.0], np.cumsum(rate[1:] * dt)])
 
@@ -157,10 +182,12 @@ def _judge(q: Array, tracking: Array, excess: dict[str, float], solution: Soluti
 
 def _between_knots(
     problem: Problem, plant: _Plant, trajectory: Trajectory, qd_start: Array
-) -> tuple[float, float, dict[str, float]]:
-    """The cubic spline through the knots: kinetic-energy integral (Simpson), largest tracking error, excess of limits."""
+) -> tuple[float, float, float, dict[str, float]]:
+    """The cubic spline through the knots: kinetic-energy integral (Simpson), objective, largest tracking error, excess of
+    limits.
+    """
     if not np.all(np.isfinite(trajectory.q)) or len(trajectory.time) < 4:
-        return float("nan"), float("nan"), {}
+        return float("nan"), float("nan"), float("nan"), {}
     # Only torques tie the first velocity to rest; the energy's sum lets it jump, and nothing prescribes the last one.
     torque_counts = problem.objective.torque > 0 or bool(np.isfinite(problem.bounds.torque).any())
     rest = problem.reference.timing.at_rest and problem.boundary is not Boundary.CYCLIC and torque_counts
@@ -172,15 +199,20 @@ def _between_knots(
     dt = np.diff(trajectory.time)
     moments = (trajectory.time[:-1, None] + dt[:, None] * fraction).ravel()
     q, qd, qdd, x_ref = spline(moments), spline(moments, 1), spline(moments, 2), problem.reference.position(moments)
-    energy, error, tau = np.empty(len(moments)), np.empty(len(moments)), np.zeros_like(q)
+    energy, error, tau, secondary = np.empty(len(moments)), np.empty(len(moments)), np.zeros_like(q), np.zeros(len(moments))
     for i in range(len(moments)):
         plant.at(q[i], qd[i])
         energy[i] = plant.kinetic_energy()
         error[i] = np.linalg.norm(plant.tip()[rows] - x_ref[i])
         if problem.bounds.any:
             tau[i] = plant.torque(qdd[i])
-    integral = float(energy.reshape(len(dt), -1) @ weights @ dt)
-    return integral, float(error.max()), limit_excess(problem, q, qd, tau)
+        if problem.objective.secondary:
+            secondary[i] = plant.secondary(problem, q[i])
+    integral, norm, gain = (
+        float(rate.reshape(len(dt), -1) @ weights @ dt) for rate in (energy, (qd**2).sum(axis=1), secondary)
+    )
+    objective = _weighted(problem, integral, float("nan"), norm, gain)
+    return integral, objective, float(error.max()), limit_excess(problem, q, qd, tau)
 
 
 def limit_excess(problem: Problem, q: Array, qd: Array, tau: Array) -> dict[str, float]:
@@ -240,6 +272,21 @@ class _Plant:
         return np.array(
             [joint.frame_on_child().CalcPoseInWorld(self.context).translation() for joint in self.joints] + [self.tip()]
         )
+
+    def secondary(self, problem: Problem, q: Array) -> float:
+        """w at q (n,): Pontryagin report eqs (14), (15), the latter with its square."""
+        criteria, total = problem.objective.secondary, 0.0
+        if criteria is None or not np.all(np.isfinite(q)):
+            return 0.0 if criteria is None else float("nan")
+        if "manipulability" in criteria.criteria:
+            self.at(q, np.zeros_like(q))
+            jacobian = self.jacobian()[problem.task.rows]
+            total += float(np.sqrt(max(np.linalg.det(jacobian @ jacobian.T), 0.0)))
+        if "joint_centering" in criteria.criteria:
+            for value, low, high in zip(q, criteria.lower, criteria.upper, strict=True):
+                if np.isfinite(high - low):
+                    total -= ((value - (high + low) / 2) / (high - low)) ** 2 / (2 * len(q))
+        return total
 
     def jacobian(self) -> Array:
         world = self.plant.world_frame()

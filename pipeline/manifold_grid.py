@@ -1,7 +1,8 @@
 """The grid that dynamic programming runs on: every knot's self-motion manifold sampled, and the cost of each step.
 
-A step from node a to node b costs 1/2 d' M(q_b) d / dt with d = q_b - q_a: the kinetic-energy integral of one interval by
-backward differences (PMKE paper eq. (4), Global paper eq. (5)).
+A step from node a to node b costs 1/2 d' G(q_b) d / dt with d = q_b - q_a: for G = M the kinetic-energy integral of one
+interval by backward differences (PMKE paper eq. (4), Global paper eq. (5)); a secondary criterion adds its part of the
+trapezoidal rule (`lagrangian.py`).
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.arrays import Array
+from pipeline.lagrangian import Lagrangian
 from pipeline.problem import Boundary, Problem
 from pipeline.self_motion import manifolds
 
@@ -22,10 +24,13 @@ PAIRS = 2**16  # node pairs per batch: what stays in the processor's cache
 
 @dataclass(frozen=True)
 class Layer:
-    """The nodes of one knot: q (K, n) [rad], L (K, n, n) with M = L L', whether they are within limits (K,), loop sizes."""
+    """The nodes of one knot: q (K, n) [rad], L (K, n, n) with G = L L', the gain k0 w (K,), whether they are within limits
+    (K,), loop sizes.
+    """
 
     q: Array
     root: Array
+    gain: Array
     allowed: NDArray[np.bool_]
     loops: tuple[int, ...]
 
@@ -33,7 +38,8 @@ class Layer:
         """Every other node of every loop; a single node stays."""
         if self.loops == (1,):
             return self
-        return Layer(self.q[::2], self.root[::2], self.allowed[::2], tuple(size // 2 for size in self.loops))
+        sizes = tuple(size // 2 for size in self.loops)
+        return Layer(self.q[::2], self.root[::2], self.gain[::2], self.allowed[::2], sizes)
 
 
 @dataclass(frozen=True)
@@ -58,10 +64,11 @@ class Grid:
     def steps(self, i: int, nodes: Index | None = None) -> Iterator[tuple[slice, Array]]:
         """Costs (R, A) [J s] of interval i to R nodes at its end (all, or the given ones) from all A at its start."""
         before, after = self.layers[i], self.layers[i + 1]
-        q, root = (after.q, after.root) if nodes is None else (after.q[nodes], after.root[nodes])
-        allowed = after.allowed if nodes is None else after.allowed[nodes]
-        factor = root / np.sqrt(2 * (self.times[i + 1] - self.times[i]))
-        start = np.where(before.allowed, 0.0, np.inf)
+        chosen = slice(None) if nodes is None else nodes
+        q, root, gain, allowed = after.q[chosen], after.root[chosen], after.gain[chosen], after.allowed[chosen]
+        dt = self.times[i + 1] - self.times[i]
+        factor = root / np.sqrt(2 * dt)
+        start = np.where(before.allowed, -dt / 2 * before.gain, np.inf)
         rows = max(1, PAIRS // len(before.q))
         for first in range(0, len(q), rows):
             part = slice(first, min(first + rows, len(q)))
@@ -74,7 +81,7 @@ class Grid:
                 cost += whitened * whitened
             for j in np.flatnonzero(np.isfinite(self.step_limit[i])):
                 cost[np.abs(difference[j]) > self.step_limit[i, j]] = np.inf
-            cost += start
+            cost += start - dt / 2 * gain[part, None]
             cost[~allowed[part]] = np.inf
             yield part, cost
 
@@ -89,7 +96,8 @@ def _difference(end: Array, start: Array, turning: bool) -> Array:
 def make_grid(problem: Problem, times: Array, nodes: int, velocity_slack: float = 0.0) -> Grid:
     """Trace the manifolds of all knots `times` (N + 1,) and evaluate M at their nodes, once each, stacked.
 
-    A joint whose position limits leave at most a turn is represented within them and cannot jump across the gap.
+    A joint whose position limits leave at most a turn is represented within them and cannot jump across the gap; one that
+    is centred in its range is represented half a turn to either side of the centre.
     """
     task, bounds = problem.task, problem.bounds
     fixed, cyclic = problem.boundary is Boundary.FIXED, problem.boundary is Boundary.CYCLIC
@@ -104,14 +112,21 @@ def make_grid(problem: Problem, times: Array, nodes: int, velocity_slack: float 
 
     revolute = task.arm.description.revolute
     held = revolute & (bounds.upper - bounds.lower <= 2 * np.pi)
+    lowest = np.where(held, bounds.lower, 0.0)
+    secondary = problem.objective.secondary
+    if secondary is not None and "joint_centering" in secondary.criteria:
+        centred = revolute & ~held & np.isfinite(secondary.upper - secondary.lower)
+        lowest = np.where(centred, (secondary.upper + secondary.lower) / 2 - np.pi, lowest)
+        held |= centred
     turning = revolute & ~held
     flat = np.concatenate(q)
-    turns = np.floor((flat - np.where(held, bounds.lower, 0.0) + 1e-9) / (2 * np.pi))
+    turns = np.floor((flat - lowest + 1e-9) / (2 * np.pi))
     flat = flat - np.where(held, 2 * np.pi * turns, 0.0)
     within = np.all(turning | ((flat <= bounds.upper + 1e-9) & (flat >= bounds.lower - 1e-9)), axis=1)
-    root = np.linalg.cholesky(task.arm.mass_matrix(flat))
+    lagrangian = Lagrangian(task, problem.objective)
+    root, gain = np.linalg.cholesky(lagrangian.metric(flat)), lagrangian.gain(flat)[0]
     ends = np.cumsum([len(of_knot) for of_knot in q])[:-1]
-    parts = zip(np.split(flat, ends), np.split(root, ends), np.split(within, ends), sizes, strict=True)
+    parts = zip(*(np.split(values, ends) for values in (flat, root, gain, within)), sizes, strict=True)
     layers = [Layer(*part) for part in parts]
     if cyclic:
         layers.append(layers[0])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path as File
 from typing import Any
 
@@ -27,6 +28,7 @@ from pipeline.path import (
     read_waypoints,
 )
 from pipeline.problem import Boundary, Limits, Objective, Problem
+from pipeline.secondary import Secondary
 from pipeline.task import PositionTask
 
 PROJECT = File(__file__).resolve().parent.parent
@@ -53,7 +55,7 @@ def prepare(config: schema.RunConfig) -> Problem:
         reference,
         q_init,
         _knots(config.timing),
-        objective=Objective(*config.objective.weights),
+        objective=_objective(config, arm),
         limits=_limits(config.limits, arm),
         boundary=Boundary(config.boundary.kind),
     )
@@ -102,6 +104,20 @@ def _limits(limits: schema.LimitsConfig, arm: Arm) -> Limits:
     )
 
 
+def _objective(config: schema.RunConfig, arm: Arm) -> Objective:
+    """The objective; joints are centred in the ranges of the description, or those that `limits` gives."""
+    own = config.objective
+    if not own.criteria:
+        return Objective(*own.weights)
+    ranges = _limits(replace(config.limits, kind="joint"), arm)
+    if "joint_centering" in own.criteria and not np.isfinite(ranges.upper - ranges.lower).any():
+        raise ConfigError(
+            f"objective.secondary = {own.secondary}: {arm.description.name} states no joint limits to centre its joints in; "
+            "give limits.lower and limits.upper"
+        )
+    return Objective(*own.weights, Secondary(own.criteria, own.k0, ranges.lower, ranges.upper))
+
+
 def _check(problem: Problem) -> None:
     """Refuse what no motion can meet: contradicting limits, a fixed start outside them, an open path for a cycle."""
     limits, names = problem.bounds, problem.task.arm.description.joints
@@ -110,7 +126,7 @@ def _check(problem: Problem) -> None:
             f"limits.lower of {names[joint]} ({limits.lower[joint]:.4g}) is not below limits.upper ({limits.upper[joint]:.4g})"
         )
     weights = problem.objective.kinetic_energy + problem.objective.torque
-    if abs(weights - 1.0) > 1e-9:
+    if problem.objective.velocity_norm == 0 and abs(weights - 1.0) > 1e-9:
         raise ConfigError(f"objective.kinetic_energy + objective.torque = {weights:g}: the weights must add up to 1")
     if problem.boundary is Boundary.FIXED:
         outside = np.flatnonzero((problem.q_init < limits.lower) | (problem.q_init > limits.upper))

@@ -11,6 +11,7 @@ import numpy as np
 
 from pipeline.arrays import Array
 from pipeline.path import Reference
+from pipeline.secondary import Secondary
 from pipeline.task import PositionTask
 
 Progress = Callable[[int, int, float], None]  # (done, all, best cost so far)
@@ -32,10 +33,14 @@ class Status(enum.Enum):
 
 @dataclass(frozen=True)
 class Objective:
-    """A convex combination of integrals: weight of the kinetic energy and of the squared joint torques."""
+    """A sum of integrals: weights of the kinetic energy, the squared joint torques and the squared joint velocities;
+    what `secondary` gains is taken off (Pontryagin report eq. (13) with the sign that maximises it).
+    """
 
     kinetic_energy: float = 1.0
     torque: float = 0.0
+    velocity_norm: float = 0.0
+    secondary: Secondary | None = None
 
 
 LIMIT_KINDS = ("position", "velocity", "torque", "power")

@@ -54,6 +54,10 @@ class PositionTask:
         x, jacobian = self.arm.position_and_jacobian(q)
         return x[:, self.rows], jacobian[:, self.rows]
 
+    def jacobian_gradient(self, q: Array) -> Array:
+        """d J_ij / d q_k (K, m, n, n) [m/rad^2]."""
+        return self.arm.jacobian_gradient(q)[:, self.rows]
+
     def jacobian_rate_term(self, q: Array, qd: Array) -> Array:
         """Jd qd (K, m) [m/s^2]."""
         return self.arm.jacobian_rate_term(q, qd)[:, self.rows]

@@ -7,9 +7,10 @@ Every quantity that is penalised or limited is an unknown of its own, tied to th
     u_i = s_i tau_i,    tau_i = M(q_i) qdd_i + n(q_i, qd_i)           only if torques or powers count,
 
 with backward differences throughout: qdd_i = (qd_i - qd_(i-1)) / dt_i (PMKE paper eq. (4), Global paper eqs (3)-(6)).
-For the kinetic energy, S_i = sqrt(dt_i / C) L_i' with M(q_guess,i) = L_i L_i' and C the cost of the guess: divided by
-C, the objective then has nearly the identity for a Hessian in w, which is what IPOPT's limited-memory approximation
-starts from. The squared torques are a plain |u|^2. Positions scaled small do not weigh in that start. Position and
+For the kinetic energy and the velocity norm, 1/2 qd' G qd (`lagrangian.py`), S_i = sqrt(dt_i / C) L_i' with
+G(q_guess,i) = L_i L_i' and C the cost of the guess: divided by C, the objective then has nearly the identity for a
+Hessian in w, which is what IPOPT's limited-memory approximation starts from. A secondary criterion is integrated by the
+trapezoidal rule: with the velocity norm the program is then of second order in the step. The squared torques are a plain |u|^2. Positions scaled small do not weigh in that start. Position and
 torque limits are bounds; velocity limits are bounds or linear rows; power limits are bilinear rows. A bounded
 integral (epsilon-constraint, Global paper eqs (21), (22)) is a row over sums of a few knots each.
 """
@@ -28,6 +29,7 @@ from pipeline import ipopt
 from pipeline.arrays import Array
 from pipeline.costs import Costs, integrals, velocities
 from pipeline.differentiable import DifferentiableConstraint, DifferentiableCost
+from pipeline.lagrangian import Lagrangian, trapezoid_weights
 from pipeline.problem import INTEGRALS, Boundary, Problem
 
 POSITION_SCALE = 0.03
@@ -51,7 +53,8 @@ class Transcription:
         self.dt = np.diff(times)
         self.x_ref = problem.reference.position(times)
         self.integral_bounds = problem.integral_bounds
-        self.counts_energy = self.objective.kinetic_energy > 0 or np.isfinite(self.integral_bounds.kinetic_energy)
+        self.lagrangian = Lagrangian(problem.task, self.objective)
+        self.bounds_energy = np.isfinite(self.integral_bounds.kinetic_energy)
         self.counts_torque = self.objective.torque > 0 or np.isfinite(self.integral_bounds.torque)
         self.lifts_torque = self.counts_torque or bool(
             np.isfinite(self.limits.torque).any() or np.isfinite(self.limits.power).any()
@@ -80,13 +83,16 @@ class Transcription:
         for block in _blocks(first_free, self.intervals + (0 if closed else 1)):
             self._add_tracking(block)
         for block in _blocks(0, self.intervals):
-            if self.objective.kinetic_energy > 0 and not elastic:
-                self._add_kinetic_energy(block)
+            if self.lagrangian.is_quadratic and not elastic:
+                self._add_quadratic(block)
             if self.lifts_torque:
                 self._add_torque(block)
         if self.objective.torque > 0 and not elastic:
             flat = self.u.ravel()
             self.program.AddQuadraticCost(2 * np.eye(len(flat)), np.zeros(len(flat)), flat, is_convex=True)
+        if self.objective.secondary is not None and not elastic:
+            for block in _blocks(0, self.intervals + 1):
+                self._add_secondary(block)
         if not elastic:
             self._bound_integrals()
 
@@ -114,13 +120,14 @@ class Transcription:
         self.qd_guess = qd[1:]
         costs: Costs = integrals(self.problem, self.times, q)
         self.tau_guess = costs.tau[1:]
-        weighted = self.objective.kinetic_energy * costs.kinetic_energy + self.objective.torque * costs.torque
-        self.cost = weighted if weighted > 0 else 1.0
+        quadratic = self.objective.kinetic_energy * costs.kinetic_energy + self.objective.velocity_norm * costs.velocity_norm
+        self.cost = (quadratic + self.objective.torque * costs.torque + abs(costs.gain)) or 1.0
         self.energy = costs.kinetic_energy if costs.kinetic_energy > 0 else 1.0
-        if self.counts_energy:
+        if self.lagrangian.is_quadratic or self.bounds_energy:
             # Half |w|^2 is the energy's share of the cost, or its ratio to the guess's where it is only bounded.
-            share = self.objective.kinetic_energy / self.cost if self.objective.kinetic_energy > 0 else 1 / self.energy
-            root = np.linalg.cholesky(self.arm.mass_matrix(q[1:]))
+            share = 1 / self.cost if self.lagrangian.is_quadratic else 1 / self.energy
+            metric = self.lagrangian.metric(q[1:]) if self.lagrangian.is_quadratic else self.arm.mass_matrix(q[1:])
+            root = np.linalg.cholesky(metric)
             factor = 1 / np.sqrt(share * dt)[:, None, None]
             self.to_velocity = factor * np.linalg.inv(root).transpose(0, 2, 1)  # qd_i = to_velocity_i w_i
             self.diagonal = False
@@ -217,25 +224,37 @@ class Transcription:
 
     # --- nonlinear terms, KNOTS_PER_BINDING knots each ----------------------------------------------------------
 
-    def _energy(self, block: Block, weight: Array) -> Callable[[Array], tuple[float, Array]]:
-        """The sum of weight_i T_i over a block, by (y, w)."""
+    def _energy(
+        self, gradient: Callable[[Array, Array], tuple[Array, Array, Array]], block: Block, weight: Array
+    ) -> Callable[[Array], tuple[float, Array]]:
+        """The sum of weight_i T_i over a block, by (y, w), for T (K,) with its gradients by q and qd."""
         shape, to_velocity = (len(block), self.n), self.to_velocity[block]
         split = len(block) * self.n
 
         def energy(x: Array) -> tuple[float, Array]:
             q = x[:split].reshape(shape) / POSITION_SCALE
             velocity = (to_velocity @ x[split:].reshape(*shape, 1))[:, :, 0]
-            value, by_q, by_velocity = self.arm.kinetic_energy_gradient(q, velocity)
+            value, by_q, by_velocity = gradient(q, velocity)
             by_y = by_q * weight[:, None] / POSITION_SCALE
             by_w = (by_velocity[:, None, :] @ to_velocity)[:, 0] * weight[:, None]
             return float(value @ weight), np.concatenate([by_y.ravel(), by_w.ravel()])
 
         return energy
 
-    def _add_kinetic_energy(self, block: Block) -> None:
+    def _add_quadratic(self, block: Block) -> None:
         unknowns = np.concatenate([self.y[block + 1].ravel(), self.w[block].ravel()])
-        energy = self._energy(block, self.objective.kinetic_energy * self.dt[block] / self.cost)
+        energy = self._energy(self.lagrangian.quadratic_gradient, block, self.dt[block] / self.cost)
         self.program.AddCost(DifferentiableCost(energy), vars=unknowns)
+
+    def _add_secondary(self, knots: Block) -> None:
+        """-k0 w(q_i) with the trapezoidal rule's weights."""
+        weight = trapezoid_weights(self.times)[knots] / self.cost
+
+        def loss(x: Array) -> tuple[float, Array]:
+            value, by_q = self.lagrangian.gain(x.reshape(len(knots), self.n) / POSITION_SCALE)
+            return -float(value @ weight), -(by_q * weight[:, None] / POSITION_SCALE).ravel()
+
+        self.program.AddCost(DifferentiableCost(loss), vars=self.y[knots].ravel())
 
     def _bound_integrals(self) -> None:
         """Sums of a few knots are unknowns of their own, bounded together: the rows stay sparse."""
@@ -255,7 +274,7 @@ class Transcription:
             self._sums.append((kind, sums))
 
     def _bound_energy(self, block: Block, total: Any, bound: float) -> None:
-        energy = self._energy(block, self.dt[block] / bound)
+        energy = self._energy(self.arm.kinetic_energy_gradient, block, self.dt[block] / bound)
 
         def excess(x: Array) -> tuple[Array, Array]:
             value, gradient = energy(x[:-1])

@@ -24,12 +24,12 @@ def table(problem: Problem, evaluations: Sequence[Evaluation]) -> pd.DataFrame:
     pairs = _pairs(planner, stationary, revolute)
     rows = []
     for index, e in enumerate(planner):
-        row = {"planner_optimum": e.solution.optimum, "planner_energy": e.energy_integral[-1]}
+        row = {"planner_optimum": e.solution.optimum, "planner_objective": e.objective}
         if index in pairs:
             other = stationary[pairs[index]]
             row |= {
                 "stationary_motion": other.solution.optimum,
-                "stationary_energy": other.solution.statistics["energy_integral"],
+                "stationary_objective": other.solution.statistics["integral"],
                 "mean_absolute_difference": float(np.abs(wrap(e.q - other.q, revolute)).mean()),
                 "kind": other.solution.statistics["kind"],
             }
@@ -50,16 +50,16 @@ def table(problem: Problem, evaluations: Sequence[Evaluation]) -> pd.DataFrame:
             rows.append(
                 {
                     "stationary_motion": other.solution.optimum,
-                    "stationary_energy": other.solution.statistics["energy_integral"],
+                    "stationary_objective": other.solution.statistics["integral"],
                     "kind": kind,
                     "remark": remark,
                 }
             )
     columns = [
         "planner_optimum",
-        "planner_energy",
+        "planner_objective",
         "stationary_motion",
-        "stationary_energy",
+        "stationary_objective",
         "mean_absolute_difference",
     ]
     return pd.DataFrame(rows, columns=[*columns, "kind", "remark"])

@@ -33,7 +33,7 @@ def stationary(line: Problem) -> list[Solution]:
 
 @pytest.mark.slow
 def test_six_stationary_motions_four_of_them_minima(line: Problem, stationary: list[Solution]) -> None:
-    energies = [motion.statistics["energy_integral"] for motion in stationary]
+    energies = [motion.statistics["integral"] for motion in stationary]
     np.testing.assert_allclose(energies, [0.0527173, 0.0560103, 0.0568004, 0.0665889, 0.1225733, 0.2178448], atol=1e-7)
     kinds = [motion.statistics["kind"] for motion in stationary]
     assert kinds == ["minimum"] * 4 + ["saddle"] * 2
@@ -76,7 +76,7 @@ def test_an_independent_integration_agrees(line: Problem, stationary: list[Solut
     result = solve_ivp(slope, (0, 1), start, method="RK45", rtol=1e-9, atol=1e-10)
     np.testing.assert_allclose(result.y[:n, -1], best.trajectory.q[-1], atol=1e-6)
     np.testing.assert_allclose(result.y[n : 2 * n, -1], 0, atol=1e-5)
-    assert result.y[-1, -1] == pytest.approx(best.statistics["energy_integral"], abs=1e-8)
+    assert result.y[-1, -1] == pytest.approx(best.statistics["integral"], abs=1e-8)
 
 
 @pytest.mark.slow
@@ -107,7 +107,7 @@ def test_fixed_start(line: Problem) -> None:
     assert best.statistics["kind"] == "minimum"
     np.testing.assert_array_equal(best.trajectory.q[0], Q_INIT)
     # In 1 s instead of 10 s: 0.06093 on 101 points is the optimum of trajectory 3 of the PMKE paper (6.093e-3).
-    assert best.statistics["energy_integral"] == pytest.approx(0.060629, abs=1e-6)
+    assert best.statistics["integral"] == pytest.approx(0.060629, abs=1e-6)
     assert backward_differences(line, line.times, best.trajectory.q[None])[0] == pytest.approx(0.06093, abs=1e-5)
 
 

@@ -67,7 +67,7 @@ def test_the_energy_of_a_prediction_is_that_of_its_knots(problem: Make, predicti
     arm = asked.task.arm
     for (_, points, *_), entry in zip(predictions, solution.statistics["predictions"], strict=True):
         qd = np.diff(points, axis=0)  # knots are a second apart
-        assert entry["energy_integral"] == pytest.approx(arm.kinetic_energy(points[1:], qd).sum(), rel=1e-6)
+        assert entry["objective"] == pytest.approx(arm.kinetic_energy(points[1:], qd).sum(), rel=1e-6)
 
 
 @pytest.mark.parametrize(

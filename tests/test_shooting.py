@@ -10,7 +10,9 @@ from pydrake.autodiffutils import ExtractGradient, InitializeAutoDiff
 
 from pipeline.arrays import Array
 from pipeline.kinematics import project
+from pipeline.lagrangian import Lagrangian
 from pipeline.path import Reference
+from pipeline.problem import Objective
 from pipeline.shooting import Window
 from pipeline.task import PositionTask
 
@@ -30,7 +32,7 @@ def test_derivatives_equal_central_differences(
     horizon: int,
     rng: np.random.Generator,
 ) -> None:
-    window = Window(task, horizon, 0.7)
+    window = Window(Lagrangian(task, Objective()), horizon, 0.7)
     x_ref = reference(3).position(2.0 + 0.7 * np.arange(1, horizon + 1))
     window.solve(q_init, x_ref, rollout(task, q_init, x_ref))
     cost, rows = window.program.generic_costs()[0], window.program.generic_constraints()[0]
@@ -53,7 +55,7 @@ def test_the_optimum_is_the_peers(
 ) -> None:
     x_ref = reference(number).position(1.0 * np.arange(1, horizon + 1))
     guess = rollout(task, q_init, x_ref)
-    window = Window(task, horizon, 1.0)
+    window = Window(Lagrangian(task, Objective()), horizon, 1.0)
     q, energy, outcome, iterations = window.solve(q_init, x_ref, guess, tolerance=1e-9)
     program = peer_program.kinetic_energy_program(peer.arm, horizon, 1.0, 1e-12)  # type: ignore[attr-defined]
     q_peer, energy_peer, _ = peer_program.solve(program, q_init, x_ref, guess)
@@ -67,7 +69,7 @@ def test_the_optimum_is_the_peers(
 def test_one_window_serves_many_problems(
     task: PositionTask, reference: Callable[[int], Reference], q_init: Array
 ) -> None:
-    window = Window(task, 2, 1.0)
+    window = Window(Lagrangian(task, Objective()), 2, 1.0)
     answers = []
     for number in (3, 2, 3):
         x_ref = reference(number).position(np.array([3.0, 4.0]))
@@ -79,7 +81,7 @@ def test_one_window_serves_many_problems(
 
 def test_a_path_that_has_not_begun_leaves_the_arm_at_rest(task: PositionTask, q_init: Array) -> None:
     x_ref = np.tile(task.value(q_init[None]), (3, 1))
-    q, energy, outcome, _ = Window(task, 3, 1.0).solve(q_init, x_ref, np.tile(q_init, (3, 1)))
+    q, energy, outcome, _ = Window(Lagrangian(task, Objective()), 3, 1.0).solve(q_init, x_ref, np.tile(q_init, (3, 1)))
     assert outcome.converged
     np.testing.assert_allclose(q, np.tile(q_init, (3, 1)), atol=1e-9)
     assert energy < 1e-15

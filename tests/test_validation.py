@@ -36,7 +36,7 @@ def planner(problem: Problem, q: Array, optimum: int = 1, status: Status = Statu
 
 
 def stationary(problem: Problem, q: Array, optimum: int = 1, kind: str = "minimum") -> Evaluation:
-    facts: dict[str, Any] = {"kind": kind, "energy_integral": ENERGIES[kind]}
+    facts: dict[str, Any] = {"kind": kind, "integral": ENERGIES[kind]}
     solution = Solution(
         "calculus_of_variations", Trajectory(problem.times, q), Status.SOLVED, "", optimum, statistics=facts
     )
@@ -57,7 +57,7 @@ def test_pairs_are_made_by_path_not_by_rank(line: Problem, paths: list[Array]) -
     assert list(made["planner_optimum"]) == [1, 2]
     assert list(made["stationary_motion"]) == [2, 1]
     assert list(made["kind"]) == ["saddle", "minimum"]
-    assert list(made["stationary_energy"]) == [0.07, 0.05]
+    assert list(made["stationary_objective"]) == [0.07, 0.05]
     assert made["remark"].isna().all()
     np.testing.assert_allclose(made["mean_absolute_difference"], [shift.mean(), 0.0], atol=1e-12)
 
@@ -80,7 +80,7 @@ def test_what_has_no_partner_says_why(line: Problem, paths: list[Array]) -> None
     assert "continuous time" in alone["remark"]
     assert "timing.steps" in alone["remark"]
     assert pd.isna(alone["stationary_motion"])
-    assert alone["planner_energy"] == motions[1].energy_integral[-1]
+    assert alone["planner_objective"] == motions[1].objective
     assert (missed["stationary_motion"], saddle["stationary_motion"]) == (1, 2)
     assert missed["remark"] == "the planner did not find it"
     assert saddle["remark"].startswith("not a minimum")
@@ -106,4 +106,4 @@ def test_what_failed_is_no_optimum(line: Problem, paths: list[Array]) -> None:
 def test_columns_are_there_without_any_row(line: Problem) -> None:
     made = table(line, [])
     assert len(made) == 0
-    assert {"planner_optimum", "stationary_energy", "kind", "remark"} <= set(made.columns)
+    assert {"planner_optimum", "stationary_objective", "kind", "remark"} <= set(made.columns)

@@ -1,5 +1,8 @@
 """Every stationary motion of the kinetic-energy integral, by the calculus of variations (r = 1, no limits).
 
+Or of any other integral of first order, L = 1/2 qd' G qd - k0 w (`lagrangian.py`): G then stands for M, and the gradient
+of k0 w joins n.
+
 With a multiplier lambda(t) for the task J qdd = xdd - Jd qd, Lagrange's equations of T = 1/2 qd' M qd are
 M qdd + n = J' lambda, hence
 
@@ -28,6 +31,7 @@ from pipeline.arrays import Array
 from pipeline.config import CalculusOfVariationsOptions
 from pipeline.errors import InputError
 from pipeline.kinematics import pseudoinverse, wrap
+from pipeline.lagrangian import Lagrangian
 from pipeline.problem import Boundary, Problem, Progress, Solution, Status, Trajectory, no_progress
 from pipeline.self_motion import manifold, on_manifold, tangent
 
@@ -56,7 +60,7 @@ def solve(
     options: CalculusOfVariationsOptions = CalculusOfVariationsOptions(),
     progress: Progress = no_progress,
 ) -> list[Solution]:
-    """All stationary motions on problem.times, cheapest first. Their statistics: `energy_integral` [J s] in continuous
+    """All stationary motions on problem.times, cheapest first. Their statistics: `integral`, the objective in continuous
     time, `kind` (minimum or saddle), `index`, `unknown` [rad or rad/s] and `residual` t' M qd at T.
     """
     check(problem)
@@ -70,7 +74,7 @@ def solve(
         near += _near_misses(unknowns, values)
         progress(number + 1, len(families), float("nan"))
     motions = [motion for family in families for motion in _motions(problem, family, found, options)]
-    motions.sort(key=lambda motion: float(motion.statistics["energy_integral"]))
+    motions.sort(key=lambda motion: float(motion.statistics["integral"]))
     if not motions:
         standing = np.tile(problem.q_init, (len(problem.times), 1))
         message = "no stationary motion was found: scan more densely, or further for a fixed start"
@@ -94,12 +98,12 @@ def solve(
 
 def check(problem: Problem) -> None:
     """Refuse problems that this method does not serve; raises InputError."""
-    supported = "supported are r = 1, the kinetic energy, boundary free or fixed, and no limits"
+    supported = "supported are r = 1, an objective of first order, boundary free or fixed, and no limits"
     bounds = problem.bounds
     limits = np.concatenate([bounds.lower, bounds.upper, bounds.velocity, bounds.torque, bounds.power])
     if problem.task.redundancy != 1:
         raise InputError(f"calculus_of_variations: the redundancy degree is {problem.task.redundancy}; {supported}")
-    if problem.objective.torque:
+    if problem.objective.torque or not Lagrangian(problem.task, problem.objective).is_quadratic:
         raise InputError(f"calculus_of_variations: the objective holds a torque integral; {supported}")
     if problem.boundary is Boundary.CYCLIC:
         raise InputError(f"calculus_of_variations: the boundary is cyclic; {supported}")
@@ -109,11 +113,12 @@ def check(problem: Problem) -> None:
 
 def _families(problem: Problem, options: CalculusOfVariationsOptions) -> list[_Family]:
     task = problem.task
+    lagrangian = Lagrangian(task, problem.objective)
     x, xd, _ = problem.reference.sample(np.zeros(1))
 
     def least_energy(q: Array) -> Array:
         jacobian = task.jacobian(q)
-        right = np.linalg.solve(task.arm.mass_matrix(q), np.swapaxes(jacobian, 1, 2))
+        right = np.linalg.solve(lagrangian.metric(q), np.swapaxes(jacobian, 1, 2))
         return (right @ np.linalg.solve(jacobian @ right, np.broadcast_to(xd[0, :, None], (len(q), task.m, 1))))[
             :, :, 0
         ]
@@ -153,7 +158,7 @@ def _final(problem: Problem, family: _Family, u: Array, tolerance: float, most_s
 def _residual(problem: Problem, state: Array) -> Array:
     n = problem.task.arm.n
     q, qd = np.nan_to_num(state[:, :n]), state[:, n : 2 * n]
-    momentum = np.einsum("kij,kj->ki", problem.task.arm.mass_matrix(q), qd)
+    momentum = np.einsum("kij,kj->ki", Lagrangian(problem.task, problem.objective).metric(q), qd)
     return np.asarray((tangent(problem.task.jacobian(q)) * momentum).sum(axis=1))
 
 
@@ -243,7 +248,7 @@ def _motions(
             Trajectory(times, q[i]),
             Status.SOLVED,
             statistics={
-                "energy_integral": float(states[-1][i, 2 * n]),
+                "integral": float(states[-1][i, 2 * n]),
                 "kind": "minimum" if index[i] == 0 else "saddle",
                 "index": int(index[i]),
                 "unknown": float(roots[i]),
@@ -259,7 +264,7 @@ def _motions(
 
 
 def _state(q: Array, qd: Array) -> Array:
-    """(P, 2 n + 1): q, qd and the kinetic-energy integral so far."""
+    """(P, 2 n + 1): q, qd and the objective so far."""
     return np.hstack([q, qd, np.zeros((len(q), 1))])
 
 
@@ -267,16 +272,16 @@ def rate(problem: Problem, t: Array, state: Array) -> Array:
     """d/dt of the states (P, 2 n + 1) at times t (P,): the stationarity condition (see the module)."""
     task, n = problem.task, problem.task.arm.n
     q, qd = state[:, :n], state[:, n : 2 * n]
-    jacobian, mass = task.jacobian(q), task.arm.mass_matrix(q)
+    lagrangian = Lagrangian(task, problem.objective)
+    jacobian, metric = task.jacobian(q), lagrangian.metric(q)
     wanted = problem.reference.sample(t)[2] - task.jacobian_rate_term(q, qd)
-    bias = task.arm.bias(q, qd)
-    inverse = np.linalg.inv(mass)
+    bias, inverse = lagrangian.bias(q, qd), np.linalg.inv(metric)
     right = inverse @ np.swapaxes(jacobian, 1, 2)
     free = -(inverse @ bias[:, :, None])
     multiplier = np.linalg.solve(jacobian @ right, wanted[:, :, None] - jacobian @ free)
     qdd = (free + right @ multiplier)[:, :, 0]
-    energy = 0.5 * np.einsum("ki,kij,kj->k", qd, mass, qd)
-    return np.hstack([qd, qdd, energy[:, None]])
+    value = 0.5 * np.einsum("ki,kij,kj->k", qd, metric, qd) - lagrangian.gain(q)[0]
+    return np.hstack([qd, qdd, value[:, None]])
 
 
 def _integrate(

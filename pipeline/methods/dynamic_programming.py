@@ -2,8 +2,8 @@
 
 Every knot's manifold is sampled evenly in arc length (all loops: `self_motion.py`), and Bellman's recursion
 V_i(b) = min_a V_(i-1)(a) + 1/2 d' M(q_b) d / dt_i, with d = q_b - q_a the joint difference of one interval, runs over
-all pairs of nodes, so that it needs no assumption on how the manifold changes along the path. The sum is the
-kinetic-energy integral by backward differences (PMKE paper eq. (4), Global paper eq. (5)). Every path of the grid keeps
+all pairs of nodes, so that it needs no assumption on how the manifold changes along the path (other terms of first order:
+`manifold_grid.py`). The sum is the kinetic-energy integral by backward differences (PMKE paper eq. (4), Global paper eq. (5)). Every path of the grid keeps
 the task at its knots and is feasible for the transcription on the same knots: the cost bounds that program's optimum
 from above, and its excess, the grid error, is of second order in the node spacing.
 """
@@ -20,6 +20,7 @@ from pipeline.candidates import distinct
 from pipeline.config import DynamicProgrammingOptions
 from pipeline.errors import InputError
 from pipeline.kinematics import wrap
+from pipeline.lagrangian import Lagrangian
 from pipeline.manifold_grid import Grid, Index, make_grid
 from pipeline.problem import Boundary, Problem, Progress, Solution, Status, Trajectory, no_progress
 
@@ -64,9 +65,9 @@ def check(problem: Problem) -> None:
     """Refuse problems that this method does not serve; raises InputError."""
     if problem.task.redundancy != 1:
         raise InputError(f"dynamic_programming: the redundancy degree is {problem.task.redundancy}; supported is r = 1")
-    if problem.objective.torque:
+    if problem.objective.torque or not Lagrangian(problem.task, problem.objective).is_quadratic:
         raise InputError(
-            "dynamic_programming needs an objective of first order, the kinetic energy; a torque integral is not one"
+            "dynamic_programming needs an objective of first order, such as the kinetic energy; a torque integral is not one"
         )
     ends = problem.reference.position(np.array([0.0, problem.reference.duration]))
     if problem.boundary is Boundary.CYCLIC and np.linalg.norm(ends[1] - ends[0]) > 1e-9:

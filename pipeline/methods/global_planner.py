@@ -20,6 +20,7 @@ from pipeline.config import GlobalOptions
 from pipeline.costs import objective_values
 from pipeline.feasibility import Relaxed, least_violation
 from pipeline.kinematics import wrap
+from pipeline.lagrangian import Lagrangian
 from pipeline.parallel import Workers
 from pipeline.problem import LIMIT_KINDS, Objective, Problem, Progress, Solution, Status, Trajectory, no_progress
 from pipeline.transcription import Transcription
@@ -163,7 +164,9 @@ def _optimise_start(context: tuple[Problem, Array, GlobalOptions], guess: Array)
     torque_counts = problem.objective.torque > 0 or np.isfinite(bounds.torque).any() or np.isfinite(bounds.power).any()
     if torque_counts:
         free = np.full(problem.task.arm.n, np.inf)
-        smooth = replace(problem, objective=Objective(), limits=replace(bounds, torque=free, power=free))
+        first_order = Lagrangian(problem.task, problem.objective).is_quadratic
+        objective = replace(problem.objective, torque=0.0) if first_order else Objective()
+        smooth = replace(problem, objective=objective, limits=replace(bounds, torque=free, power=free))
         first = _optimise(smooth, times, guess, options)
         solves += first.solves
         if not first.converged:

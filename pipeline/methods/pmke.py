@@ -1,7 +1,8 @@
 """PMKE, predictive minimisation of kinetic energy (PMKE paper, Table 1): look h steps ahead, follow in the null space.
 
 Every update interval I the kinetic-energy integral over the next h knots, Delta T apart, is minimised (eq. (4)); the
-pseudoinverse follows the path while the null space follows the predicted joint motion (eq. (2), step 7).
+pseudoinverse follows the path while the null space follows the predicted joint motion (eq. (2), step 7). An objective of
+other terms of first order (`lagrangian.py`) takes the kinetic energy's place.
 """
 
 from __future__ import annotations
@@ -15,7 +16,8 @@ from scipy.interpolate import BSpline, make_interp_spline
 from pipeline.arrays import Array
 from pipeline.config import PmkeOptions
 from pipeline.kinematics import SingularityWatch, project, pseudoinverse
-from pipeline.problem import Problem, Solution, Status, Trajectory
+from pipeline.lagrangian import Lagrangian
+from pipeline.problem import Objective, Problem, Solution, Status, Trajectory
 from pipeline.shooting import Window
 
 
@@ -70,7 +72,10 @@ class _Predictor:
     def __init__(self, problem: Problem, options: PmkeOptions, horizon: int) -> None:
         self.task, self.reference, self.options, self.horizon = problem.task, problem.reference, options, horizon
         self.step = min(options.prediction_step, problem.reference.duration)
-        self.program = Window(problem.task, horizon, self.step)
+        lagrangian = Lagrangian(problem.task, problem.objective)
+        if not lagrangian.is_quadratic:
+            lagrangian = Lagrangian(problem.task, Objective())
+        self.program = Window(lagrangian, horizon, self.step)
         self.previous: tuple[Array, Array] | None = None
         self.log: list[dict[str, Any]] = []
 
@@ -83,7 +88,7 @@ class _Predictor:
             for guess in self._guesses(q, x_ref, knots)
         ]
         best = min(results, key=lambda result: (not result[2].converged, result[1]))
-        ahead, energy, outcome, iterations = best
+        ahead, value, outcome, iterations = best
         times = np.concatenate([[now], knots])
         points = np.vstack([q, ahead])
         self.previous = times, points
@@ -97,7 +102,7 @@ class _Predictor:
                 "iterations": iterations,
                 "converged": outcome.converged,
                 "status": outcome.status,
-                "energy_integral": energy,
+                "objective": value,
             }
         )
         return spline

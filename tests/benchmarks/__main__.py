@@ -15,6 +15,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from pipeline.config import GlobalOptions, PmkeOptions, check
+from pipeline.lagrangian import Lagrangian
 from pipeline.methods import global_planner, pmke
 from pipeline.run import prepare
 from pipeline.shooting import Window
@@ -53,7 +54,7 @@ def predictions() -> None:
     pmke.solve(problem, options)
     Window.solve = solve  # type: ignore[method-assign]
 
-    window = Window(problem.task, options.horizon, options.prediction_step)
+    window = Window(Lagrangian(problem.task, problem.objective), options.horizon, options.prediction_step)
     arm = peer.PlanarArm.from_urdf(peer.ROBOT)
     program = peer.kinetic_energy_program(arm, options.horizon, options.prediction_step, options.tolerance)
     ours, theirs, gap = [], [], 0.0
