@@ -139,8 +139,8 @@ class Arm:
 
         return self._map(one, q)
 
-    def jacobian_gradient(self, q: Array) -> Array:
-        """d J_ij / d q_k (K, 3, n, n) of the translational Jacobian [m/rad^2], exact and symmetric in j, k.
+    def jacobian_and_gradient(self, q: Array) -> tuple[Array, Array]:
+        """Translational Jacobians (K, 3, n) and d J_ij / d q_k (K, 3, n, n) [m/rad^2], exact and symmetric in j, k.
 
         An earlier joint a turns whatever a later joint b does to the end effector: d J_b / d q_a = w_a x J_b, with w_a
         the angular Jacobian's column (zero for a sliding joint).
@@ -149,7 +149,8 @@ class Arm:
         turning, moving = both[:, :3].swapaxes(1, 2), both[:, 3:].swapaxes(1, 2)
         product = np.cross(turning[:, :, None], moving[:, None])  # (K, a, b, 3), right for a <= b
         earlier = np.tri(self.n, dtype=bool).T[:, :, None]
-        return np.ascontiguousarray(np.where(earlier, product, product.swapaxes(1, 2)).transpose(0, 3, 1, 2))
+        gradient = np.where(earlier, product, product.swapaxes(1, 2)).transpose(0, 3, 1, 2)
+        return both[:, 3:], np.ascontiguousarray(gradient)
 
     # --- dynamics -----------------------------------------------------------------------------------------------
 

@@ -235,7 +235,7 @@ class PontryaginOptions:
     guesses: int = count(24)
     intervals: int = count(40, low=4)
     tolerance: float = number(1e-9, above=0)
-    max_nodes: int = count(4000, low=10)
+    max_nodes: int = count(20000, low=10)
     same_path: float = number(0.01, above=0, unit="rad")
 
 

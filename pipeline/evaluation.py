@@ -157,7 +157,12 @@ def _weighted(problem: Problem, energy: float, torque: float, norm: float, secon
     """The objective from its integrals; a term without weight does not count, even where it is not known."""
     weights = problem.objective
     k0 = weights.secondary.k0 if weights.secondary else 0.0
-    terms = ((weights.kinetic_energy, energy), (weights.torque, torque), (weights.velocity_norm, norm), (-k0, secondary))
+    terms = (
+        (weights.kinetic_energy, energy),
+        (weights.torque, torque),
+        (weights.velocity_norm, norm),
+        (-k0, secondary),
+    )
     return sum(weight * term for weight, term in terms if weight)
 
 
@@ -199,7 +204,12 @@ def _between_knots(
     dt = np.diff(trajectory.time)
     moments = (trajectory.time[:-1, None] + dt[:, None] * fraction).ravel()
     q, qd, qdd, x_ref = spline(moments), spline(moments, 1), spline(moments, 2), problem.reference.position(moments)
-    energy, error, tau, secondary = np.empty(len(moments)), np.empty(len(moments)), np.zeros_like(q), np.zeros(len(moments))
+    energy, error, tau, secondary = (
+        np.empty(len(moments)),
+        np.empty(len(moments)),
+        np.zeros_like(q),
+        np.zeros(len(moments)),
+    )
     for i in range(len(moments)):
         plant.at(q[i], qd[i])
         energy[i] = plant.kinetic_energy()

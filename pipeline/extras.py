@@ -1,4 +1,4 @@
-"""What only some runs have beside their motions: the certificate, the validation table, the candidate study."""
+"""What only some runs have beside their motions: certificate, validation and convergence tables, candidate study."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from pipeline import candidate_study, certificate, front, validation
+from pipeline import candidate_study, certificate, convergence, front, validation
 from pipeline.config import RunConfig
 from pipeline.costs import objective_values
 from pipeline.evaluation import Evaluation
@@ -24,6 +24,7 @@ class Extras:
     validation: pd.DataFrame | None = None
     study: candidate_study.Study | None = None
     front: pd.DataFrame | None = None
+    convergence: pd.DataFrame | None = None
 
     def shown(self, evaluations: Sequence[Evaluation]) -> list[Evaluation]:
         """The motions that figures show one by one: all of them, but of a front its extremes, its knee and a few between."""
@@ -43,6 +44,7 @@ def compute(problem: Problem, config: RunConfig, evaluations: Sequence[Evaluatio
         certificate=None if pair is None else certificate.certify(problem, *pair),
         validation=validation.table(problem, evaluations) if methods >= {"global", "calculus_of_variations"} else None,
         front=front.table(evaluations),
+        convergence=convergence.table(problem, [evaluation.solution for evaluation in evaluations]),
         study=_study(problem, config, evaluations) if config.candidate_study.run else None,
     )
 

@@ -43,7 +43,11 @@ class Lagrangian:
         value, by_q, by_qd = self.norm * (qd * qd).sum(axis=1), np.zeros_like(q), 2 * self.norm * qd
         if self.inertia:
             energy, energy_by_q, momentum = self.arm.kinetic_energy_gradient(q, qd)
-            value, by_q, by_qd = value + self.inertia * energy, self.inertia * energy_by_q, by_qd + self.inertia * momentum
+            value, by_q, by_qd = (
+                value + self.inertia * energy,
+                self.inertia * energy_by_q,
+                by_qd + self.inertia * momentum,
+            )
         return value, by_q, by_qd
 
     def bias(self, q: Array, qd: Array) -> Array:

@@ -22,13 +22,15 @@ from pipeline.lagrangian import Lagrangian
 def rates(lagrangian: Lagrangian, xd: Array, q: Array, costate: Array) -> tuple[Array, Array]:
     """qd and lambdad (K, n) at q, lambda (K, n) where the path asks for xd (K, m)."""
     task = lagrangian.task
-    jacobian, inverse = task.jacobian(q), np.linalg.inv(lagrangian.metric(q))
+    jacobian, gradient = task.jacobian_and_gradient(q)
+    metric = lagrangian.metric(q)
+    inverse = np.linalg.inv(metric)
     right = weighted_pseudoinverse(jacobian, inverse)
     free = _times(inverse, costate)
     qd = free + _times(right, xd - _times(jacobian, free))
-    multiplier = _times(right.swapaxes(1, 2), costate - _times(lagrangian.metric(q), qd))
+    multiplier = _times(right.swapaxes(1, 2), costate - _times(metric, qd))
     by_q = lagrangian.quadratic_gradient(q, qd)[1] - lagrangian.gain(q)[1]
-    return qd, by_q + np.einsum("kijl,kl,ki->kj", task.jacobian_gradient(q), qd, multiplier)
+    return qd, by_q + np.einsum("kijl,kl,ki->kj", gradient, qd, multiplier)
 
 
 def costates(lagrangian: Lagrangian, times: Array, q: Array, qd: Array) -> Array:

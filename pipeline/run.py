@@ -10,7 +10,7 @@ from pathlib import Path as File
 from pipeline import config as schema
 from pipeline import extras, resume
 from pipeline.evaluation import evaluate
-from pipeline.methods import calculus_of_variations, dynamic_programming, global_planner, lsv, pareto, pmke
+from pipeline.methods import calculus_of_variations, dynamic_programming, global_planner, lsv, pareto, pmke, pontryagin
 from pipeline.parallel import Workers
 from pipeline.prepare import prepare
 from pipeline.problem import Problem, Progress, Solution
@@ -28,6 +28,8 @@ def state(config: schema.RunConfig) -> Problem:
         dynamic_programming.check(problem)
     if "calculus_of_variations" in config.methods:
         calculus_of_variations.check(problem)
+    if "pontryagin" in config.methods:
+        pontryagin.check(problem)
     return problem
 
 
@@ -36,6 +38,7 @@ def solve(
 ) -> list[tuple[list[Solution], float]]:
     """The solutions of each method asked for, in order, with the method's wall time [s]."""
     options = config.method
+    own = options.pontryagin
     methods: dict[str, Callable[[], list[Solution]]] = {
         "lsv": lambda: [lsv.solve(problem, options.lsv)],
         "pmke": lambda: [pmke.solve(problem, options.pmke)],
@@ -43,9 +46,15 @@ def solve(
         "pareto": lambda: pareto.solve(problem, config.pareto, options.global_, config.seed, workers, progress),
         "dynamic_programming": lambda: dynamic_programming.solve(problem, options.dynamic_programming),
         "calculus_of_variations": lambda: calculus_of_variations.solve(problem, options.calculus_of_variations),
+        "pontryagin": lambda: pontryagin.boundary_value(problem, own, config.seed, workers, progress),
+        "pontryagin_as_printed": lambda: pontryagin.as_printed(problem, own),
     }
+    asked = list(config.methods)
+    if "pontryagin" in asked and own.formulation != "boundary_value":
+        at = asked.index("pontryagin")
+        asked[at : at + 1] = ["pontryagin_as_printed", "pontryagin"][: 1 if own.formulation == "as_printed" else 2]
     results = []
-    for method in config.methods:
+    for method in asked:
         begin = time.perf_counter()
         solutions = methods[method]()
         results.append((solutions, time.perf_counter() - begin))
@@ -84,7 +93,7 @@ def run_and_write(config: schema.RunConfig, folder: File) -> int:
     timed("extras", begin)
 
     begin = time.perf_counter()
-    summary = tables.summary(evaluations, wall_times, config.published)
+    summary = tables.summary(problem, evaluations, wall_times, config.published)
     markdown = tables.markdown(config, problem, evaluations, summary, extra)
     tables.write(folder, evaluations, summary, markdown, extra)
     timed("tables", begin)

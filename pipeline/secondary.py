@@ -45,17 +45,19 @@ def manipulability(task: PositionTask, q: Array) -> tuple[Array, Array]:
 
     d sigma_i = u_i' dJ v_i, and no singular value is divided by: the gradient is finite at a singularity too.
     """
-    u, sigma, vt = np.linalg.svd(task.jacobian(q), full_matrices=False)
+    jacobian, gradient = task.jacobian_and_gradient(q)
+    u, sigma, vt = np.linalg.svd(jacobian, full_matrices=False)
     m = sigma.shape[1]
     others = np.stack([np.prod(np.delete(sigma, i, axis=1), axis=1) for i in range(m)], axis=1)
     by_jacobian = (u * others[:, None, :]) @ vt  # (K, m, n)
-    return np.prod(sigma, axis=1), np.einsum("kij,kijl->kl", by_jacobian, task.jacobian_gradient(q))
+    return np.prod(sigma, axis=1), np.einsum("kij,kijl->kl", by_jacobian, gradient)
 
 
 def joint_centering(q: Array, lower: Array, upper: Array) -> tuple[Array, Array]:
     """w = -1/(2 n) sum ((q_i - qbar_i) / (q_iM - q_im))^2 (K,) and dw/dq (K, n): eq. (15) with its square."""
     ranged = np.isfinite(upper - lower)
-    middle, span = np.where(ranged, (lower + upper) / 2, 0.0), np.where(ranged, upper - lower, np.inf)
+    low, high = np.where(ranged, lower, 0.0), np.where(ranged, upper, 0.0)
+    middle, span = (low + high) / 2, np.where(ranged, high - low, np.inf)
     offset = (q - middle) / span
     n = q.shape[1]
     return -(offset**2).sum(axis=1) / (2 * n), -offset / (n * span)

@@ -58,7 +58,9 @@ class Window:
         w = quasi_newton(self._energy, self._tracking, start, tolerance=0.1 * tolerance)
         outcome = ipopt.solve(self.program, w, tolerance=tolerance, **options)
         q, qd = self._motion(outcome.x)
-        value = self.dt * float(self.lagrangian.quadratic(q, qd).sum()) - float(self.lagrangian.gain(q)[0] @ self._weights)
+        value = self.dt * float(self.lagrangian.quadratic(q, qd).sum()) - float(
+            self.lagrangian.gain(q)[0] @ self._weights
+        )
         return q, value, outcome, self._rows.iterations
 
     def _motion(self, w: Array) -> tuple[Array, Array]:

@@ -54,9 +54,10 @@ class PositionTask:
         x, jacobian = self.arm.position_and_jacobian(q)
         return x[:, self.rows], jacobian[:, self.rows]
 
-    def jacobian_gradient(self, q: Array) -> Array:
-        """d J_ij / d q_k (K, m, n, n) [m/rad^2]."""
-        return self.arm.jacobian_gradient(q)[:, self.rows]
+    def jacobian_and_gradient(self, q: Array) -> tuple[Array, Array]:
+        """J (K, m, n) and d J_ij / d q_k (K, m, n, n) [m/rad^2] from one pass."""
+        jacobian, gradient = self.arm.jacobian_and_gradient(q)
+        return jacobian[:, self.rows], gradient[:, self.rows]
 
     def jacobian_rate_term(self, q: Array, qd: Array) -> Array:
         """Jd qd (K, m) [m/s^2]."""

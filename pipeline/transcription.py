@@ -120,7 +120,9 @@ class Transcription:
         self.qd_guess = qd[1:]
         costs: Costs = integrals(self.problem, self.times, q)
         self.tau_guess = costs.tau[1:]
-        quadratic = self.objective.kinetic_energy * costs.kinetic_energy + self.objective.velocity_norm * costs.velocity_norm
+        quadratic = (
+            self.objective.kinetic_energy * costs.kinetic_energy + self.objective.velocity_norm * costs.velocity_norm
+        )
         self.cost = (quadratic + self.objective.torque * costs.torque + abs(costs.gain)) or 1.0
         self.energy = costs.kinetic_energy if costs.kinetic_energy > 0 else 1.0
         if self.lagrangian.is_quadratic or self.bounds_energy:

@@ -40,8 +40,8 @@ def motions(asked: Problem, guess: Callable[[Problem], Array]) -> list[Evaluatio
 
 
 @pytest.fixture
-def summary(motions: list[Evaluation]) -> pd.DataFrame:
-    return tables.summary(motions, {"lsv": 0.5, "global": 2.5}, PUBLISHED)
+def summary(asked: Problem, motions: list[Evaluation]) -> pd.DataFrame:
+    return tables.summary(asked, motions, {"lsv": 0.5, "global": 2.5}, PUBLISHED)
 
 
 def test_summary_is_one_row_per_motion(motions: list[Evaluation], summary: pd.DataFrame) -> None:
@@ -156,7 +156,7 @@ def test_a_printed_zero_or_an_unknown_column_is_no_crash(asked: Problem, motions
     values = {"lsv": {"torque_integral": 0.0, "nonsense": 1.0}}
     published = config.check({"published": {"values": values}}).published
     with np.errstate(divide="ignore"):
-        table = tables.summary(motions, {"lsv": 0.5, "global": 2.5}, published)
+        table = tables.summary(asked, motions, {"lsv": 0.5, "global": 2.5}, published)
     assert np.isnan(table["difference_nonsense"][0])
     text = tables.markdown(RunConfig(published=published), asked, motions, table, Extras())
     assert "printed 0" in text

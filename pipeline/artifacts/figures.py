@@ -142,13 +142,14 @@ def stroboscopic(problem: Problem, evaluations: Sequence[Evaluation], name: str)
 
 
 def joints(problem: Problem, evaluations: Sequence[Evaluation], name: str) -> Figure:
-    """Joint positions and velocities (Figs 4-7 and 9-12, below)."""
+    """Joint positions with their limits, and velocities (PMKE paper Figs 4-7, 9-12, below; Pontryagin report Figs 3-7 a)."""
     position, velocity = _unit(problem, "rad", "m"), _unit(problem, "rad/s", "m/s")
     return _by_joint(
         f"{name}: joint positions and velocities",
         evaluations,
         (f"Position $q$ [{position}]", position, lambda e: e.q),
         (rf"Velocity $\dot q$ [{velocity}]", velocity, lambda e: e.qd),
+        bounds=_ranges(problem),
     )
 
 
@@ -215,8 +216,21 @@ def tracking(problem: Problem, evaluations: Sequence[Evaluation], name: str) -> 
     return figure
 
 
-def _by_joint(title: str, evaluations: Sequence[Evaluation], *kinds: tuple[str, str, Values]) -> Figure:
-    """A column per motion, a row per kind (label, unit, values); many motions are broken into blocks of such rows."""
+def _ranges(problem: Problem) -> Array:
+    """The joint limits (2, n) that the motion must keep, or is to stay in the middle of; infinite without any."""
+    bounds, secondary = problem.bounds, problem.objective.secondary
+    if secondary is not None and "joint_centering" in secondary.criteria:
+        return np.array([secondary.lower, secondary.upper])
+    return np.array([bounds.lower, bounds.upper])
+
+
+def _by_joint(
+    title: str, evaluations: Sequence[Evaluation], *kinds: tuple[str, str, Values], bounds: Array | None = None
+) -> Figure:
+    """A column per motion, a row per kind (label, unit, values); many motions are broken into blocks of such rows.
+
+    bounds (2, n) are drawn, broken lines in the joints' colours, into the row of the first kind.
+    """
     blocks, columns = _shape(len(evaluations))
     rows = blocks * len(kinds)
     figure = _figure(title, 1.0 + columns * (4.4 if columns < 4 else 3.4), 1.2 + rows * 2.6)
@@ -231,6 +245,11 @@ def _by_joint(title: str, evaluations: Sequence[Evaluation], *kinds: tuple[str, 
                 _limit(axes, evaluations, values)
             for joint, line in enumerate(values(e).T):
                 _draw(axes, e, line, style.joint_color(joint), f"Joint {joint + 1}")
+                for bound in () if bounds is None or row else bounds[:, joint]:
+                    if np.isfinite(bound):
+                        axes.axhline(bound, color=style.joint_color(joint), linestyle=(0, (2, 3)), linewidth=1.0)
+                        low, high = axes.get_ylim()
+                        axes.set_ylim(min(low, 1.05 * bound), max(high, 1.05 * bound))
             axes.set_xlim(e.time[0], e.time[-1])
             if row == 0:
                 axes.set_title(style.name(e.label), color=style.color(e.method), fontweight="bold", fontsize=11)

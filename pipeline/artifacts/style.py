@@ -11,6 +11,7 @@ METHOD_COLORS = {
     "calculus_of_variations": "#6B46C1",
     "dynamic_programming": "#5A6472",
     "pontryagin": "#C53030",
+    "pontryagin_as_printed": "#B7791F",
     "pareto": "#2F855A",
 }
 METHOD_NAMES = {
@@ -20,6 +21,7 @@ METHOD_NAMES = {
     "calculus_of_variations": "Calculus of variations",
     "dynamic_programming": "Dynamic programming",
     "pontryagin": "Pontryagin",
+    "pontryagin_as_printed": "Pontryagin, as printed",
     "pareto": "Pareto point",
 }
 # Joints 1, 2, 3 are blue, red and yellow in the papers; the others keep apart from them and from one another.

@@ -27,6 +27,8 @@ UNITS = {
     "torque_integral": "N² m² s",
     "max_tracking_error": "m",
     "max_tracking_error_between": "m",
+    "final_error": "m",
+    "velocity_norm_integral": "rad²/s",
     "peak_velocity": "rad/s",
     "peak_torque": "N m",
     "peak_power": "W",
@@ -38,12 +40,12 @@ UNITS = {
 
 
 def summary(
-    evaluations: Sequence[Evaluation], wall_times: Mapping[str, float], published: PublishedConfig
+    problem: Problem, evaluations: Sequence[Evaluation], wall_times: Mapping[str, float], published: PublishedConfig
 ) -> pd.DataFrame:
     """One row per motion; `published_*` and `difference_*` (relative) columns where a document prints the number."""
     rows = []
     for evaluation in evaluations:
-        row = _row(evaluation) | {"wall_time_s": wall_times[evaluation.method]}
+        row = _row(problem, evaluation) | {"wall_time_s": wall_times[evaluation.method]}
         if evaluation.solution.optimum == 1:
             for column, printed in published.values.get(evaluation.method, {}).items():
                 row[f"published_{column}"] = printed
@@ -54,7 +56,23 @@ def summary(
     return pd.DataFrame(rows)
 
 
-def _row(e: Evaluation) -> dict[str, Any]:
+def _first_order(problem: Problem, e: Evaluation) -> dict[str, Any]:
+    """What an objective beyond kinetic energy and torque adds: the whole of it, and its parts."""
+    weights = problem.objective
+    if not weights.velocity_norm and weights.secondary is None:
+        return {}
+    return {
+        "objective": e.objective,
+        "objective_spline": e.objective_spline,
+        "velocity_norm_integral": e.velocity_norm_integral[-1],
+        "secondary_integral": float(np.trapezoid(e.secondary, e.time)),
+        "objective_of_method": e.solution.statistics.get("integral", np.nan),
+        "transversality_start": e.solution.statistics.get("transversality_start", np.nan),
+        "transversality_end": e.solution.statistics.get("transversality_end", np.nan),
+    }
+
+
+def _row(problem: Problem, e: Evaluation) -> dict[str, Any]:
     radius = int(np.argmin(e.spectral_radius))
     row: dict[str, Any] = {
         "method": e.method,
@@ -64,8 +82,10 @@ def _row(e: Evaluation) -> dict[str, Any]:
         "kinetic_energy_integral": e.energy_integral[-1],
         "torque_integral": e.torque_integral[-1],
         "kinetic_energy_integral_spline": e.energy_integral_spline,
+        **_first_order(problem, e),
         "max_tracking_error": e.tracking_error.max(),
         "max_tracking_error_between": e.tracking_error_between,
+        "final_error": e.tracking_error[-1],
     }
     for name, values in (("velocity", e.qd), ("torque", e.tau), ("power", e.power)):
         row |= {f"peak_{name}_{j + 1}": peak for j, peak in enumerate(np.abs(values).max(axis=0))}
@@ -127,6 +147,9 @@ def markdown(
         share = hypervolume(good[extras.front.columns[2:4]].to_numpy())
         lines += ["", "## Pareto front", "", f"Hypervolume {share:.4f} of the rectangle between the extremes.", ""]
         lines += markdown_table(_cells(extras.front.drop(columns=["solver_status"])))
+    if extras.convergence is not None:
+        lines += ["", "## Planner on finer grids, against the extremal of the maximum principle", ""]
+        lines += markdown_table(_cells(extras.convergence))
     if extras.study is not None:
         study = extras.study
         lines += [
@@ -191,6 +214,9 @@ def write(folder: Path, evaluations: Sequence[Evaluation], table: pd.DataFrame, 
     if extras.validation is not None:
         validation = extras.validation
         write_beside(folder / "validation.csv", lambda file: validation.to_csv(file, index=False))
+    if extras.convergence is not None:
+        convergence = extras.convergence
+        write_beside(folder / "convergence.csv", lambda file: convergence.to_csv(file, index=False))
     if extras.front is not None:
         front = extras.front
         write_beside(folder / "front.csv", lambda file: front.to_csv(file, index=False))

@@ -68,7 +68,9 @@ def as_printed(problem: Problem, options: PontryaginOptions = PontryaginOptions(
         q[k], costate = q[k - 1] + (time[k] - time[k - 1]) * qd[0], costate + (time[k] - time[k - 1]) * slope
     gap = float(np.linalg.norm(problem.task.value(q[-1:])[0] - problem.reference.position(time[-1:])[0]))
     left = transversality(lagrangian, q[-1], costate[0])
-    message = f"solved as the report prints it: {gap:.3g} m off at the end, |(I - J+J) lambda(T)| = {left:.3g} instead of 0"
+    message = (
+        f"solved as the report prints it: {gap:.3g} m off at the end, |(I - J+J) lambda(T)| = {left:.3g} instead of 0"
+    )
     return [
         Solution(
             "pontryagin_as_printed",
@@ -139,7 +141,7 @@ def _guesses(problem: Problem, options: PontryaginOptions, rng: np.random.Genera
     the wrong end.
     """
     times = np.linspace(0.0, problem.reference.duration, options.intervals + 1)
-    starts = starting_points(problem, options.guesses, rng, "normal")
+    starts = starting_points(problem, options.guesses, rng, "uniform")
     revolute = problem.task.arm.description.revolute
     parts = []
     for motions in (population(problem, times, starts, POPULATION, rng), _shots(problem, times, starts, rng)):
