@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -22,9 +23,9 @@ def table(problem: Problem, evaluations: Sequence[Evaluation]) -> pd.DataFrame:
     planner = [e for e in evaluations if e.method == "global" and e.confirmed]
     stationary = [e for e in evaluations if e.method == "calculus_of_variations" and e.confirmed]
     pairs = _pairs(planner, stationary, revolute)
-    rows = []
+    rows: list[dict[str, Any]] = []
     for index, e in enumerate(planner):
-        row = {"planner_optimum": e.solution.optimum, "planner_objective": e.objective}
+        row: dict[str, Any] = {"planner_optimum": e.solution.optimum, "planner_objective": e.objective}
         if index in pairs:
             other = stationary[pairs[index]]
             row |= {

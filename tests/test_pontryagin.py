@@ -97,7 +97,8 @@ def test_the_costate_equation_is_the_printed_one_but_for_the_sign(rng: np.random
 def test_fixed_start(case: str) -> None:
     problem, found = stated(case), extremals(case, "fixed")
     best = found[0]
-    assert best.status is Status.SOLVED and best.statistics["kind"] == "minimum"
+    assert best.status is Status.SOLVED
+    assert best.statistics["kind"] == "minimum"
     assert best.statistics["integral"] == pytest.approx(EXACT[case], rel=1e-7)
     np.testing.assert_allclose(best.trajectory.q[-1], ENDS[case], atol=1e-6)
     assert best.statistics["transversality_end"] < 1e-8
@@ -111,7 +112,8 @@ def test_fixed_start(case: str) -> None:
 def test_a_free_start_is_better(case: str) -> None:
     best = extremals(case, "free")[0]
     assert best.statistics["integral"] < EXACT[case] - 1e-4
-    assert best.statistics["transversality_start"] < 1e-8 and best.statistics["transversality_end"] < 1e-8
+    assert best.statistics["transversality_start"] < 1e-8
+    assert best.statistics["transversality_end"] < 1e-8
     assert evaluate(stated(case, "free"), best).confirmed
     if case != "case4":  # whose scan takes long; its best is -521.3533775
         scanned = calculus_of_variations.solve(stated(case, "free"))
@@ -137,7 +139,8 @@ def test_direct_transcription_converges_to_the_extremal_with_order_two() -> None
     best = global_planner.solve(problem, schema.GlobalOptions(candidates=60, optimised=4), 1, Workers(1))[:1]
     own = pontryagin.boundary_value(problem, PontryaginOptions(guesses=4), 1, Workers(1))[:1]
     table = convergence.table(problem, best + own)
-    assert table is not None and len(table) == 4
+    assert table is not None
+    assert len(table) == 4
     np.testing.assert_allclose(table["order"][1:], 2.0, atol=0.05)
     assert table["end_difference"].iloc[-1] < 1e-5
     assert abs(table["relative_error"].iloc[-1]) < 1e-5

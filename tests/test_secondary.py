@@ -30,7 +30,10 @@ def test_criteria_and_their_gradients(unit: PositionTask, rng: np.random.Generat
     jacobian = unit.jacobian(q)
     determinant = np.linalg.det(jacobian @ jacobian.swapaxes(1, 2))
     np.testing.assert_allclose(manipulability(unit, q)[0] ** 2, determinant, atol=1e-12)
-    expected = [-sum(((a - (lo + hi) / 2) / (hi - lo)) ** 2 for a, lo, hi in zip(row, lower, upper)) / 6 for row in q]
+    expected = [
+        -sum(((a - (lo + hi) / 2) / (hi - lo)) ** 2 for a, lo, hi in zip(row, lower, upper, strict=False)) / 6
+        for row in q
+    ]
     np.testing.assert_allclose(joint_centering(q, lower, upper)[0], expected, atol=1e-14)
     both = Secondary(("manipulability", "joint_centering"), 7.0, lower, upper)
     for row in q[:20]:
@@ -40,9 +43,11 @@ def test_criteria_and_their_gradients(unit: PositionTask, rng: np.random.Generat
 
 def test_a_singularity_has_a_finite_gradient(unit: PositionTask) -> None:
     value, gradient = manipulability(unit, np.zeros((1, 3)))
-    assert value[0] == pytest.approx(0.0, abs=1e-12) and np.isfinite(gradient).all()
+    assert value[0] == pytest.approx(0.0, abs=1e-12)
+    assert np.isfinite(gradient).all()
 
 
 def test_joints_without_a_range_have_no_centre() -> None:
     value, gradient = joint_centering(np.array([[9.0, 0.5]]), np.array([-np.inf, -1.0]), np.array([np.inf, 1.0]))
-    assert value[0] == pytest.approx(-(0.25**2) / 4) and gradient[0, 0] == 0.0
+    assert value[0] == pytest.approx(-(0.25**2) / 4)
+    assert gradient[0, 0] == 0.0

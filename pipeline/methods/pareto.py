@@ -162,7 +162,7 @@ def _try(
 def _solve_point(context: tuple[Problem, ParetoOptions], item: tuple[Point, Array]) -> Point:
     (problem, options), (point, guess) = context, item
     bounds = IntegralBounds() if point.bounded is None else IntegralBounds(**{point.bounded: point.bound})
-    objective = Objective(**dict(zip(options.objectives, point.weights, strict=True)))
+    objective = _objective(options, point.weights)
     stated = replace(problem, objective=objective, integral_bounds=bounds)
     q, outcome, _ = Transcription(stated, problem.times, guess).solve(
         tolerance=options.tolerance, max_iterations=options.max_iterations
@@ -178,7 +178,12 @@ def _values(problem: Problem, options: ParetoOptions, q: Array) -> tuple[float, 
 
 
 def _only(name: str) -> Objective:
-    return Objective(**{"kinetic_energy": 0.0, "torque": 0.0, name: 1.0})
+    return Objective(float(name == "kinetic_energy"), float(name == "torque"))
+
+
+def _objective(options: ParetoOptions, weights: tuple[float, float]) -> Objective:
+    of = dict(zip(options.objectives, weights, strict=True))
+    return Objective(of.get("kinetic_energy", 0.0), of.get("torque", 0.0))
 
 
 def _weighted(options: ParetoOptions, weights: Array) -> Objective:
