@@ -139,6 +139,43 @@ class Arm:
 
         return self._map(one, q)
 
+    def pose(self, q: Array) -> tuple[Array, Array]:
+        """Positions (K, 3) [m] and rotation matrices (K, 3, 3) of the end effector in the world."""
+
+        def one(stack: _Stack, q: Array) -> Array:
+            stack.at(q)
+            return np.array([tip.CalcPoseInWorld(stack.context).GetAsMatrix34() for tip in stack.tips])
+
+        both = self._map(one, q)
+        return both[:, :, 3], both[:, :, :3]
+
+    def pose_and_jacobian(self, q: Array) -> tuple[Array, Array, Array]:
+        """Positions (K, 3), rotation matrices (K, 3, 3) and spatial Jacobians (K, 6, n), as in the methods above."""
+
+        def one(stack: _Stack, q: Array) -> Array:
+            stack.at(q)
+            pose = np.array([tip.CalcPoseInWorld(stack.context).GetAsMatrix34() for tip in stack.tips])
+            jacobian = self._jacobians(stack, spatial=True)
+            return np.concatenate([pose.reshape(len(pose), -1), jacobian.reshape(len(pose), -1)], axis=1)
+
+        both = self._map(one, q)
+        pose = both[:, :12].reshape(-1, 3, 4)
+        return pose[:, :, 3], pose[:, :, :3], both[:, 12:].reshape(-1, 6, self.n)
+
+    def spatial_rate_term(self, q: Array, qd: Array) -> Array:
+        """Angular and linear acceleration (K, 6) [rad/s^2, m/s^2] of the end effector at qdd = 0."""
+
+        def one(stack: _Stack, q: Array, qd: Array) -> Array:
+            stack.at(q, qd)
+            bias = stack.plant.CalcBiasSpatialAcceleration
+            rows = [
+                bias(stack.context, JacobianWrtVariable.kV, tip, np.zeros(3), stack.world, stack.world)
+                for tip in stack.tips
+            ]
+            return np.array([np.concatenate([row.rotational(), row.translational()]) for row in rows])
+
+        return self._map(one, q, qd)
+
     def jacobian_and_gradient(self, q: Array) -> tuple[Array, Array]:
         """Translational Jacobians (K, 3, n) and d J_ij / d q_k (K, 3, n, n) [m/rad^2], exact and symmetric in j, k.
 

@@ -29,7 +29,16 @@ from pipeline.schema import (
     text,
 )
 
-METHODS = ("lsv", "pmke", "global", "dynamic_programming", "calculus_of_variations", "pontryagin", "pareto")
+METHODS = (
+    "lsv",
+    "inertia_weighted",
+    "pmke",
+    "global",
+    "dynamic_programming",
+    "calculus_of_variations",
+    "pontryagin",
+    "pareto",
+)
 INTEGRALS = ("kinetic_energy", "torque")
 DEFAULT_METHODS = ("lsv", "pmke", "global")
 
@@ -44,12 +53,22 @@ class RobotConfig:
     end_effector: str = text("tip")
     offset: list[float] = numbers([0.0, 0.0, 0.0], length=3, unit="m")
     task: list[str] = choices(["x", "y"], "x", "y", "z")
+    orientation: str = choice("none", "none", "full", "pointing")
+    pointing: list[float] = numbers([0.0, 0.0, 1.0], length=3)
     q_init: list[float] = numbers([0.0, 0.327, -0.754], unit="rad")
     locked: dict[str, float] | None = mapping(any_number, optional=True)
 
 
 @dataclass(frozen=True)
-class LineConfig:
+class PathConfig:
+    """What every path has for tasks with an orientation: the one it starts with, and how far it turns to its end."""
+
+    orientation: list[float] | None = numbers(None, length=3, unit="rad")
+    turn: list[float] = numbers([0.0, 0.0, 0.0], length=3, unit="rad")
+
+
+@dataclass(frozen=True)
+class LineConfig(PathConfig):
     """`path=line`: straight, `length` m along `direction`."""
 
     kind: str = fixed("line")
@@ -59,7 +78,7 @@ class LineConfig:
 
 
 @dataclass(frozen=True)
-class CircleConfig:
+class CircleConfig(PathConfig):
     """`path=circle`: through the start, centre `radius` m away along `center_direction`; `angle` deg of it."""
 
     kind: str = fixed("circle")
@@ -72,7 +91,7 @@ class CircleConfig:
 
 
 @dataclass(frozen=True)
-class WaypointsConfig:
+class WaypointsConfig(PathConfig):
     """`path=waypoints`: a smooth curve through the rows of a CSV file."""
 
     kind: str = fixed("waypoints")
@@ -259,6 +278,7 @@ class MethodConfig:
     """Group `method`: the options of every method; the key `methods` says which of them run."""
 
     lsv: LsvOptions = part(LsvOptions)
+    inertia_weighted: LsvOptions = part(LsvOptions)
     pmke: PmkeOptions = part(PmkeOptions)
     global_: GlobalOptions = part(GlobalOptions)
     dynamic_programming: DynamicProgrammingOptions = part(DynamicProgrammingOptions)

@@ -14,10 +14,12 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import FixedOffsetFrame, JacobianWrtVariable, MultibodyForces
 from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation
 
 from pipeline.arm import Arm
 from pipeline.arrays import Array
 from pipeline.problem import Boundary, Problem, Solution, Status, Trajectory
+from pipeline.task import PositionTask, Task
 
 LIMITS = 1e-6  # relative: how well a method that promises limits must keep them at its knots
 BETWEEN = 10  # sub-intervals per knot interval on which the motion between knots is judged
@@ -42,7 +44,8 @@ class Evaluation:
     power: Array  # (N + 1, n) |tau qd|
     position: Array  # (N + 1, 3) end effector in the world
     skeleton: Array  # (N + 1, n + 1, 3) joint origins and end effector
-    tracking_error: Array  # (N + 1,)
+    tracking_error: Array  # (N + 1,) [m]
+    orientation_error: Array  # (N + 1,) [rad] angle to the prescribed orientation or direction; zero without one
     kinetic_energy: Array  # (N + 1,) T
     energy_integral: Array  # (N + 1,) of T, running
     torque_integral: Array  # (N + 1,) of tau'tau, running
@@ -54,6 +57,7 @@ class Evaluation:
     spectral_radius: Array  # (N + 1,) of M
     energy_integral_spline: float  # of the cubic spline through the knots, independent of the grid's quadrature
     tracking_error_between: float  # largest between knots, along that spline
+    orientation_error_between: float
     limit_excess: dict[str, float]  # by kind, at the knots, relative; see limit_excess()
     limit_excess_between: dict[str, float]  # the same along that spline
 
@@ -82,26 +86,29 @@ def evaluate(problem: Problem, solution: Solution) -> Evaluation:
     count, n = q.shape
     tau, energy, radius = np.full((count, n), np.nan), np.full(count, np.nan), np.full(count, np.nan)
     skeleton, singular = np.full((count, n + 1, 3), np.nan), np.full(count, np.nan)
+    tracking, turned, targets = np.full(count, np.nan), np.full(count, np.nan), problem.reference.position(time)
     for i in np.flatnonzero(np.isfinite(np.hstack([q, qd, qdd])).all(axis=1)):  # Drake refuses other values
         plant.at(q[i], qd[i])
         energy[i] = plant.kinetic_energy()
         tau[i] = plant.torque(qdd[i])
         radius[i] = np.linalg.eigvalsh(plant.mass_matrix())[-1]
         skeleton[i] = plant.skeleton()
-        singular[i] = np.linalg.svd(plant.jacobian()[task.rows], compute_uv=False)[-1]
+        singular[i] = np.linalg.svd(plant.task_jacobian(task), compute_uv=False)[-1]
+        tracking[i], turned[i] = plant.task_error(task, targets[i])
     # At the first knot nothing has been spent yet: the interval's values stand at its end.
     tau[0] = tau[0] if problem.boundary is Boundary.CYCLIC else 0.0
     position = skeleton[:, -1]
-    tracking = np.linalg.norm(position[:, task.rows] - problem.reference.position(time), axis=1)
     excess = limit_excess(problem, q, qd, tau)
-    spline_integral, spline_objective, between, excess_between = _between_knots(problem, plant, trajectory, qd[0])
+    spline_integral, spline_objective, between, turned_between, excess_between = _between_knots(
+        problem, plant, trajectory, qd[0]
+    )
     secondary = np.array([plant.secondary(problem, qi) for qi in q]) if problem.objective.secondary else np.zeros(count)
     energy_integral, torque_integral = _running(energy, dt), _running((tau**2).sum(axis=1), dt)
     velocity_norm_integral = _running((qd**2).sum(axis=1), dt)
 
     status, message = solution.status, solution.message
     if status is Status.SOLVED:
-        status, message = _judge(q, tracking, excess, solution)
+        status, message = _judge(q, tracking, turned, excess, solution)
     return Evaluation(
         solution=solution,
         status=status,
@@ -115,6 +122,7 @@ def evaluate(problem: Problem, solution: Solution) -> Evaluation:
         position=position,
         skeleton=skeleton,
         tracking_error=tracking,
+        orientation_error=turned,
         kinetic_energy=energy,
         energy_integral=energy_integral,
         torque_integral=torque_integral,
@@ -132,6 +140,7 @@ def evaluate(problem: Problem, solution: Solution) -> Evaluation:
         spectral_radius=radius,
         energy_integral_spline=spline_integral,
         tracking_error_between=between,
+        orientation_error_between=turned_between,
         limit_excess=excess,
         limit_excess_between=excess_between,
     )
@@ -170,15 +179,18 @@ def _running(rate: Array, dt: Array) -> Array:
     return np.concatenate([[0.0], np.cumsum(rate[1:] * dt)])
 
 
-def _judge(q: Array, tracking: Array, excess: dict[str, float], solution: Solution) -> tuple[Status, str]:
+def _judge(
+    q: Array, tracking: Array, turned: Array, excess: dict[str, float], solution: Solution
+) -> tuple[Status, str]:
     if not np.all(np.isfinite(q)):
         return Status.UNCONFIRMED, "the motion holds values that are not finite"
-    worst = int(np.argmax(tracking))
-    if tracking[worst] > solution.tracking_tolerance:
-        return Status.UNCONFIRMED, (
-            f"the end effector is {tracking[worst]:.2e} m off its path at t = {solution.trajectory.time[worst]:.2f} s; "
-            f"{solution.method} promises {solution.tracking_tolerance:.0e} m"
-        )
+    for error, unit in ((tracking, "m"), (turned, "rad")):
+        worst = int(np.argmax(error))
+        if error[worst] > solution.tracking_tolerance:
+            return Status.UNCONFIRMED, (
+                f"the end effector is {error[worst]:.2e} {unit} off its path at t = {solution.trajectory.time[worst]:.2f} s; "
+                f"{solution.method} promises {solution.tracking_tolerance:.0e} {unit}"
+            )
     for kind in solution.limits_kept:
         if excess.get(kind, 0.0) > LIMITS:
             return Status.UNCONFIRMED, f"a {kind} limit is exceeded by {100 * excess[kind]:.2g} %"
@@ -187,33 +199,28 @@ def _judge(q: Array, tracking: Array, excess: dict[str, float], solution: Soluti
 
 def _between_knots(
     problem: Problem, plant: _Plant, trajectory: Trajectory, qd_start: Array
-) -> tuple[float, float, float, dict[str, float]]:
-    """The cubic spline through the knots: kinetic-energy integral (Simpson), objective, largest tracking error, excess of
-    limits.
+) -> tuple[float, float, float, float, dict[str, float]]:
+    """The cubic spline through the knots: kinetic-energy integral (Simpson), objective, largest tracking and orientation
+    errors, excess of limits.
     """
     if not np.all(np.isfinite(trajectory.q)) or len(trajectory.time) < 4:
-        return float("nan"), float("nan"), float("nan"), {}
+        return float("nan"), float("nan"), float("nan"), float("nan"), {}
     # Only torques tie the first velocity to rest; the energy's sum lets it jump, and nothing prescribes the last one.
     torque_counts = problem.objective.torque > 0 or bool(np.isfinite(problem.bounds.torque).any())
     rest = problem.reference.timing.at_rest and problem.boundary is not Boundary.CYCLIC and torque_counts
     ends = ((1, qd_start), "not-a-knot") if rest else "not-a-knot"
     spline = CubicSpline(trajectory.time, trajectory.q, bc_type=ends)
-    rows = problem.task.rows
     fraction = np.linspace(0.0, 1.0, BETWEEN + 1)
     weights = np.array([1.0, *([4.0, 2.0] * (BETWEEN // 2))[:-1], 1.0]) / (3 * BETWEEN)
     dt = np.diff(trajectory.time)
     moments = (trajectory.time[:-1, None] + dt[:, None] * fraction).ravel()
     q, qd, qdd, x_ref = spline(moments), spline(moments, 1), spline(moments, 2), problem.reference.position(moments)
-    energy, error, tau, secondary = (
-        np.empty(len(moments)),
-        np.empty(len(moments)),
-        np.zeros_like(q),
-        np.zeros(len(moments)),
-    )
+    energy, error, turned, secondary = np.zeros((4, len(moments)))
+    tau = np.zeros_like(q)
     for i in range(len(moments)):
         plant.at(q[i], qd[i])
         energy[i] = plant.kinetic_energy()
-        error[i] = np.linalg.norm(plant.tip()[rows] - x_ref[i])
+        error[i], turned[i] = plant.task_error(problem.task, x_ref[i])
         if problem.bounds.any:
             tau[i] = plant.torque(qdd[i])
         if problem.objective.secondary:
@@ -222,7 +229,7 @@ def _between_knots(
         float(rate.reshape(len(dt), -1) @ weights @ dt) for rate in (energy, (qd**2).sum(axis=1), secondary)
     )
     objective = _weighted(problem, integral, float("nan"), norm, gain)
-    return integral, objective, float(error.max()), limit_excess(problem, q, qd, tau)
+    return integral, objective, float(error.max()), float(turned.max()), limit_excess(problem, q, qd, tau)
 
 
 def limit_excess(problem: Problem, q: Array, qd: Array, tau: Array) -> dict[str, float]:
@@ -290,7 +297,7 @@ class _Plant:
             return 0.0 if criteria is None else float("nan")
         if "manipulability" in criteria.criteria:
             self.at(q, np.zeros_like(q))
-            jacobian = self.jacobian()[problem.task.rows]
+            jacobian = self.task_jacobian(problem.task)
             total += float(np.sqrt(max(np.linalg.det(jacobian @ jacobian.T), 0.0)))
         if "joint_centering" in criteria.criteria:
             for value, low, high in zip(q, criteria.lower, criteria.upper, strict=True):
@@ -298,9 +305,32 @@ class _Plant:
                     total -= ((value - (high + low) / 2) / (high - low)) ** 2 / (2 * len(q))
         return total
 
-    def jacobian(self) -> Array:
+    def task_error(self, task: Task, target: Array) -> tuple[float, float]:
+        """Distance [m] and angle [rad] from one target (see task.py)."""
+        distance = float(np.linalg.norm(self.tip()[task.rows] - target[: len(task.rows)]))
+        if isinstance(task, PositionTask):
+            return distance, 0.0
+        rotation = self.end.CalcPoseInWorld(self.context).rotation().matrix()
+        wanted = Rotation.from_rotvec(target[3:]).as_matrix()
+        if task.pointing is None:
+            chord = np.linalg.norm(rotation - wanted) / np.sqrt(8)  # sine of half the angle between them
+        else:
+            axis = np.array(task.pointing) / np.linalg.norm(task.pointing)
+            chord = np.linalg.norm((rotation - wanted) @ axis) / 2
+        return distance, float(2 * np.arcsin(min(chord, 1.0)))
+
+    def task_jacobian(self, task: Task) -> Array:
+        """J (m, n), angular rows in the world: for its singular values."""
         world = self.plant.world_frame()
-        jacobian = self.plant.CalcJacobianTranslationalVelocity(
-            self.context, JacobianWrtVariable.kV, self.end, np.zeros(3), world, world
-        )
-        return np.asarray(jacobian)[:, self.order]
+        both = np.asarray(
+            self.plant.CalcJacobianSpatialVelocity(
+                self.context, JacobianWrtVariable.kV, self.end, np.zeros(3), world, world
+            )
+        )[:, self.order]
+        if isinstance(task, PositionTask):
+            return both[3:][task.rows]
+        angular = both[:3]
+        if task.pointing is not None:
+            axis = self.end.CalcPoseInWorld(self.context).rotation().matrix() @ np.array(task.pointing)
+            angular = np.linalg.svd(axis[None])[2][1:] @ angular
+        return np.vstack([both[3:], angular])

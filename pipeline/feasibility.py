@@ -102,7 +102,7 @@ def _relaxed(problem: Problem, times: Array, guesses: list[Array], kinds: list[s
     best: Relaxed | None = None
     for guess in guesses:
         q, outcome, _ = Transcription(problem, times, guess, elastic=kinds).solve(tolerance=1e-6, max_iterations=150)
-        gap = np.abs(problem.task.value(q) - problem.reference.position(times)).max()
+        gap = np.abs(problem.task.error(q, problem.reference.position(times))).max()
         if not outcome.converged or gap > 1e-6:
             continue
         worst = max(

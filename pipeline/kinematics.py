@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pipeline.arrays import Array
 from pipeline.errors import PathError
 from pipeline.problem import Solution, Status, Trajectory
-from pipeline.task import PositionTask
+from pipeline.task import Task
 
 
 def pseudoinverse(jacobian: Array) -> Array:
@@ -36,7 +36,7 @@ def wrap_angles(q: Array, revolute: NDArray[np.bool_]) -> Array:
 
 
 def project(
-    task: PositionTask,
+    task: Task,
     q: Array,
     x_ref: Array,
     inverse_weight: Array | None = None,
@@ -44,7 +44,7 @@ def project(
     tolerance: float = 1e-12,
     max_iterations: int = 30,
 ) -> tuple[Array, Array]:
-    """Move each q (K, n) onto its task point x_ref (K, m) by Newton steps; returns q and the distance left (K,) [m].
+    """Move each q (K, n) onto its target x_ref (K, m) by Newton steps; returns q and the distance left (K,) [m, rad].
 
     `inverse_weight` (K, n, n) shapes the steps (see weighted_pseudoinverse); None: least joint displacement.
     """
@@ -52,8 +52,7 @@ def project(
     error = np.full(len(q), np.inf)
     rows = np.arange(len(q))  # those that are not there yet
     for _ in range(max_iterations):
-        x, jacobian = task.value_and_jacobian(q[rows])
-        gap = x_ref[rows] - x
+        gap, jacobian = task.error_and_jacobian(q[rows], x_ref[rows])
         error[rows] = np.sqrt((gap * gap).sum(axis=1))
         far = error[rows] > tolerance
         rows, gap, jacobian = rows[far], gap[far], jacobian[far]
@@ -63,21 +62,21 @@ def project(
             inverse = pseudoinverse(jacobian)
         else:
             inverse = weighted_pseudoinverse(jacobian, inverse_weight[rows])
-        step = (inverse @ gap[:, :, None])[:, :, 0]
+        step = -(inverse @ gap[:, :, None])[:, :, 0]
         # Near a singular configuration a Newton step can be arbitrarily long; half a radian is far on any arm.
         size = np.sqrt((step * step).sum(axis=1, keepdims=True))
         q[rows] += step * np.minimum(1.0, 0.5 / np.maximum(size, 1e-300))
     else:
-        error[rows] = np.linalg.norm(x_ref[rows] - task.value(q[rows]), axis=1)
+        error[rows] = np.linalg.norm(task.error(q[rows], x_ref[rows]), axis=1)
     return q, error
 
 
-def place(task: PositionTask, q_init: Array, start: Array) -> Array:
-    """The configuration near q_init (n,) whose end effector is at `start` (m,); raises PathError if there is none."""
+def place(task: Task, q_init: Array, start: Array) -> Array:
+    """The configuration near q_init (n,) whose end effector is at the target `start`; raises PathError if there is none."""
     q, error = project(task, q_init[None], start[None])
     if error[0] > 1e-10:
         raise PathError(
-            f"the path's start ({', '.join(f'{v:.4g}' for v in start)}) m is out of reach: the arm comes within {error[0]:.3g} m of it from robot.q_init"
+            f"the path's start ({', '.join(f'{v:.4g}' for v in start[: len(task.axes)])}) m is out of reach: the arm comes within {error[0]:.3g} m of it from robot.q_init"
         )
     return q[0]
 

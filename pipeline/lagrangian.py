@@ -11,13 +11,13 @@ import numpy as np
 
 from pipeline.arrays import Array
 from pipeline.problem import Objective
-from pipeline.task import PositionTask
+from pipeline.task import Task
 
 
 class Lagrangian:
     """L of an objective for one task. All arguments are stacked: q, qd (K, n)."""
 
-    def __init__(self, task: PositionTask, objective: Objective) -> None:
+    def __init__(self, task: Task, objective: Objective) -> None:
         self.task, self.arm = task, task.arm
         self.inertia, self.norm, self.secondary = objective.kinetic_energy, objective.velocity_norm, objective.secondary
 

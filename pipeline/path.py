@@ -1,6 +1,6 @@
-"""The prescribed path: its geometry by arc length, its timing law s(t), and the reference that both make.
+"""The prescribed path: its geometry and orientation by arc length, its timing law s(t), and the reference that they make.
 
-Points are in task coordinates (m = 2 for a planar task, 3 in space) [m]; s is arc length [m]; t is time [s].
+Points are in task coordinates (2 for a planar task, 3 in space) [m]; s is arc length [m]; t is time [s].
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from typing import Protocol
 import numpy as np
 import pandas as pd
 from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation, RotationSpline
 
 from pipeline.arrays import Array
 from pipeline.errors import PathError
@@ -130,6 +131,7 @@ class Spline:
         self._s = np.concatenate([[0.0], np.cumsum(pieces)])
         self._gauss = nodes, weights
         self.length = float(self._s[-1])
+        self.marks = np.interp(knots, self._u, self._s)  # (P,) [m] where along the curve the points lie
 
     def _parameter(self, s: Array) -> Array:
         s = np.clip(s, 0.0, self.length)
@@ -152,9 +154,58 @@ class Spline:
         return self._curve(u), tangent, curvature
 
 
+class Orientation:
+    """A smooth turning along a path, through `rotations` at the arc lengths `marks` (P,) [m].
+
+    Two rotations: about a fixed axis, in proportion to s. More: the spline of scipy's RotationSpline, with continuous
+    angular velocity and acceleration.
+    """
+
+    def __init__(self, marks: Array, rotations: Rotation) -> None:
+        self.marks, self.rotations = np.asarray(marks, dtype=float), rotations
+        # Its iteration does not stop on rotations that are all the same.
+        self._still = bool(np.all((rotations[0].inv() * rotations).magnitude() < 1e-12))
+        self._spline = None if self._still else RotationSpline(self.marks, rotations)
+
+    def sample(self, s: Array) -> tuple[Array, Array, Array]:
+        """Rotation vector [rad], angular velocity dphi/ds [rad/m] and its derivative by s, all in the world, each (K, 3)."""
+        if self._spline is None:
+            still = np.zeros((len(s), 3))
+            return still + self.rotations[0].as_rotvec(), still, still
+        s = np.clip(s, self.marks[0], self.marks[-1])
+        turned = self._spline(s)
+        return turned.as_rotvec(), turned.apply(self._spline(s, 1)), turned.apply(self._spline(s, 2))
+
+
+ROLL_PITCH_YAW, QUATERNION = ("roll", "pitch", "yaw"), ("qx", "qy", "qz", "qw")
+
+
 def read_waypoints(file: str | File, axes: Sequence[str]) -> Array:
     """The way-points (P, m) of a CSV file with one column for each of `axes` [m]; P >= 2, all finite, no repeats."""
-    file = File(file)
+    values = _columns(File(file), axes)
+    if len(values) < 2:
+        raise PathError(f"path.file = {file}: {len(values)} way-point{'s' * (len(values) != 1)}, at least 2 are needed")
+    repeated = np.flatnonzero(np.linalg.norm(np.diff(values, axis=0), axis=1) < 1e-12)
+    if repeated.size:
+        raise PathError(f"path.file = {file}: way-points {repeated[0] + 1} and {repeated[0] + 2} are the same point")
+    return values
+
+
+def read_orientations(file: str | File) -> Rotation | None:
+    """The orientations of the same rows: columns roll, pitch, yaw [rad] or qx, qy, qz, qw; None if there are neither."""
+    header = _table(File(file)).columns
+    if set(ROLL_PITCH_YAW) <= set(header):
+        return Rotation.from_euler("xyz", _columns(File(file), ROLL_PITCH_YAW))
+    if set(QUATERNION) <= set(header):
+        values = _columns(File(file), QUATERNION)
+        zero = np.flatnonzero(np.linalg.norm(values, axis=1) < 1e-9)
+        if zero.size:
+            raise PathError(f"path.file = {file}: row {zero[0] + 1} of the data holds a quaternion of length zero")
+        return Rotation.from_quat(values)
+    return None
+
+
+def _table(file: File) -> pd.DataFrame:
     if not file.is_file():
         raise PathError(f"path.file = {file}: no such file")
     try:
@@ -163,20 +214,20 @@ def read_waypoints(file: str | File, axes: Sequence[str]) -> Array:
         raise PathError(f"path.file = {file}: not a CSV table ({str(error).splitlines()[0]})") from None
     if not isinstance(table.index, pd.RangeIndex):
         raise PathError(f"path.file = {file}: the rows of the data hold more values than the header has columns")
-    missing = [axis for axis in axes if axis not in table.columns]
+    return table
+
+
+def _columns(file: File, names: Sequence[str]) -> Array:
+    table = _table(file)
+    missing = [name for name in names if name not in table.columns]
     if missing:
         raise PathError(
-            f"path.file = {file}: no column {', '.join(missing)}; the header is {', '.join(map(str, table.columns))}, needed are {', '.join(axes)}"
+            f"path.file = {file}: no column {', '.join(missing)}; the header is {', '.join(map(str, table.columns))}, needed are {', '.join(names)}"
         )
-    values = table[list(axes)].apply(pd.to_numeric, errors="coerce").to_numpy(dtype=float)
+    values = table[list(names)].apply(pd.to_numeric, errors="coerce").to_numpy(dtype=float)
     bad = np.flatnonzero(~np.isfinite(values).all(axis=1))
     if bad.size:
         raise PathError(f"path.file = {file}: row {bad[0] + 1} of the data holds a value that is not a finite number")
-    if len(values) < 2:
-        raise PathError(f"path.file = {file}: {len(values)} way-point{'s' * (len(values) != 1)}, at least 2 are needed")
-    repeated = np.flatnonzero(np.linalg.norm(np.diff(values, axis=0), axis=1) < 1e-12)
-    if repeated.size:
-        raise PathError(f"path.file = {file}: way-points {repeated[0] + 1} and {repeated[0] + 2} are the same point")
     return values
 
 
@@ -245,19 +296,23 @@ class Quintic:
 
 @dataclass(frozen=True)
 class Reference:
-    """The end-effector motion to follow: a geometry run through under a timing law."""
+    """The end-effector motion to follow: a geometry, with or without orientations, run through under a timing law."""
 
     geometry: Geometry
     timing: Timing
+    orientation: Orientation | None = None
 
     @property
     def duration(self) -> float:
         return self.timing.duration
 
     def sample(self, t: Array) -> tuple[Array, Array, Array]:
-        """Position, velocity and acceleration at times t (K,), each (K, m)."""
+        """Targets, their velocities and accelerations at times t (K,), each (K, m), or (K, 6) for poses (see task.py)."""
         s, sd, sdd = self.timing.sample(np.asarray(t, dtype=float), self.geometry.length)
         x, tangent, curvature = self.geometry.sample(s)
+        if self.orientation is not None:
+            turned = self.orientation.sample(s)
+            x, tangent, curvature = (np.hstack(pair) for pair in zip((x, tangent, curvature), turned, strict=True))
         return x, tangent * sd[:, None], curvature * sd[:, None] ** 2 + tangent * sdd[:, None]
 
     def position(self, t: Array) -> Array:

@@ -8,6 +8,7 @@ from pathlib import Path as File
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from pipeline import config as schema
 from pipeline.arm import Arm
@@ -18,6 +19,7 @@ from pipeline.path import (
     ConstantSpeed,
     Geometry,
     Line,
+    Orientation,
     Quintic,
     RaisedCosine,
     Reference,
@@ -25,11 +27,12 @@ from pipeline.path import (
     Timing,
     circle,
     direction_vector,
+    read_orientations,
     read_waypoints,
 )
 from pipeline.problem import Boundary, Limits, Objective, Problem
 from pipeline.secondary import Secondary
-from pipeline.task import PositionTask
+from pipeline.task import PositionTask, Task, pose_task
 
 PROJECT = File(__file__).resolve().parent.parent
 TIMINGS: dict[str, Callable[[float], Timing]] = {
@@ -43,13 +46,13 @@ def prepare(config: schema.RunConfig) -> Problem:
     """The problem that a configuration states; raises InputError, one line, if it cannot be posed."""
     robot = config.robot
     arm = Arm.from_urdf(find(robot.urdf), robot.end_effector, base=robot.base, offset=robot.offset, locked=robot.locked)
-    task = PositionTask(arm, tuple(robot.task))
+    task = _task(robot, arm)
     if len(robot.q_init) != arm.n:
         names = ", ".join(arm.description.joints)
         raise RobotError(f"robot.q_init has {len(robot.q_init)} values, the arm has {arm.n} moving joints ({names})")
     q_init = np.array(robot.q_init)
-    geometry, q_init = _geometry(config.path, task, q_init)
-    reference = Reference(geometry, TIMINGS[config.timing.law](config.timing.duration))
+    geometry, orientation, q_init = _path(config.path, task, q_init)
+    reference = Reference(geometry, TIMINGS[config.timing.law](config.timing.duration), orientation)
     problem = Problem(
         task,
         reference,
@@ -140,7 +143,8 @@ def _check(problem: Problem) -> None:
         gap = float(np.linalg.norm(ends[1] - ends[0]))
         if gap > 1e-9:
             raise PathError(
-                f"boundary = cyclic: the path ends {gap:.3g} m from where it starts; a cycle needs a closed path"
+                f"boundary = cyclic: the path ends {gap:.3g} m{' and rad' * (len(ends[0]) > 3)} from where it starts; "
+                "a cycle needs a closed path"
             )
 
 
@@ -152,35 +156,73 @@ def find(urdf: str) -> File:
     return given.absolute()  # kept results are found again from any working directory
 
 
-def _geometry(path: Any, task: PositionTask, q_init: Array) -> tuple[Geometry, Array]:
-    """The path's curve, and q_init moved onto its start if the path says where it starts."""
+def _task(robot: schema.RobotConfig, arm: Arm) -> Task:
+    if robot.orientation == "none":
+        return PositionTask(arm, tuple(robot.task))
+    if robot.task != ["x", "y", "z"]:
+        raise RobotError(
+            f"robot.task = [{', '.join(robot.task)}]: with robot.orientation = {robot.orientation} it must be [x, y, z]"
+        )
+    return pose_task(arm, robot.orientation, robot.pointing)
+
+
+def _path(path: Any, task: Task, q_init: Array) -> tuple[Geometry, Orientation | None, Array]:
+    """The path's curve and orientations, and q_init moved onto its start if the path says where it starts."""
+    count = len(task.axes)
     here = task.value(q_init[None])[0]
+    geometry = _geometry(path, task, here[:count])
+    orientation = _orientation(path, task, geometry, here[count:])
+    s = np.zeros(1)
+    start = (
+        geometry.sample(s)[0] if orientation is None else np.hstack([geometry.sample(s)[0], orientation.sample(s)[0]])
+    )
+    if np.abs(task.error(q_init[None], start)).max() > 1e-12:
+        q_init = place(task, q_init, start[0])
+    return geometry, orientation, q_init
+
+
+def _geometry(path: Any, task: Task, here: Array) -> Geometry:
+    count = len(task.axes)
     if isinstance(path, schema.WaypointsConfig):
         if path.file in ("", "???"):
             raise ConfigError("path.file: not given; the way-points are rows of a CSV file, e.g. path.file=points.csv")
         points = read_waypoints(path.file, task.axes)
-        if path.relative:
-            points = points + here - points[0]
-        return Spline(points), place(task, q_init, points[0])
-    start = here
-    if path.start is not None:
-        if len(path.start) != task.m:
-            raise ConfigError(f"path.start = {path.start}: must be {task.m} numbers m, one for each of robot.task")
-        start = np.array(path.start)
-        q_init = place(task, q_init, start)
+        return Spline(points + here - points[0] if path.relative else points)
+    if path.start is not None and len(path.start) != count:
+        raise ConfigError(f"path.start = {path.start}: must be {count} numbers m, one for each of robot.task")
+    start = here if path.start is None else np.array(path.start)
     if isinstance(path, schema.CircleConfig):
-        return (
-            circle(
-                start,
-                path.center_direction,
-                path.radius,
-                clockwise=path.clockwise,
-                normal=path.normal,
-                angle=path.angle,
-            ),
-            q_init,
+        return circle(
+            start,
+            path.center_direction,
+            path.radius,
+            clockwise=path.clockwise,
+            normal=path.normal,
+            angle=path.angle,
         )
-    return Line(start, direction_vector(path.direction, task.m), path.length), q_init
+    return Line(start, direction_vector(path.direction, count), path.length)
+
+
+def _orientation(path: schema.PathConfig, task: Task, geometry: Geometry, here: Array) -> Orientation | None:
+    """Way-points may bring their own; otherwise from `path.orientation` (or that of q_init) through `path.turn`."""
+    given = path.orientation is not None or any(path.turn)
+    if isinstance(task, PositionTask):
+        if given:
+            raise ConfigError(
+                "path.orientation, path.turn: the task prescribes no orientation; set robot.orientation to full or pointing"
+            )
+        return None
+    if isinstance(path, schema.WaypointsConfig) and isinstance(geometry, Spline):
+        own = read_orientations(path.file)
+        if own is not None and given:
+            raise ConfigError(f"path.orientation, path.turn: path.file = {path.file} has orientations of its own")
+        if own is not None:
+            return Orientation(geometry.marks, own)
+    first = Rotation.from_rotvec(here) if path.orientation is None else Rotation.from_euler("xyz", path.orientation)
+    # Turns beyond half a turn need marks between: two rotations are joined by the shorter way.
+    marks = np.linspace(0.0, 1.0, 2 + int(np.linalg.norm(path.turn) / 2))
+    turned = Rotation.from_rotvec(marks[:, None] * np.array(path.turn))
+    return Orientation(marks * geometry.length, turned * first)
 
 
 def _require_reach(problem: Problem) -> None:
@@ -188,6 +230,8 @@ def _require_reach(problem: Problem) -> None:
     task, geometry = problem.task, problem.reference.geometry
     s = np.linspace(0.0, geometry.length, 101)
     points = geometry.sample(s)[0]
+    if problem.reference.orientation is not None:
+        points = np.hstack([points, problem.reference.orientation.sample(s)[0]])
     # From the nearest of several configurations: one start alone can get stuck although the point can be reached.
     rng = np.random.default_rng(0)
     guesses = np.concatenate([problem.q_init[None], rng.uniform(-np.pi, np.pi, (11, task.arm.n))])
@@ -203,5 +247,5 @@ def _require_reach(problem: Problem) -> None:
         worst = int(np.argmax(gap))
         raise PathError(
             f"path: out of reach from {s[out[0]]:.3g} m along its {geometry.length:.3g} m on; "
-            f"the arm misses it by up to {gap[worst]:.3g} m (at {s[worst]:.3g} m)"
+            f"the arm misses it by up to {gap[worst]:.3g} m{' and rad' * (points.shape[1] > 3)} (at {s[worst]:.3g} m)"
         )

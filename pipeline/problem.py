@@ -12,7 +12,7 @@ import numpy as np
 from pipeline.arrays import Array
 from pipeline.path import Reference
 from pipeline.secondary import Secondary
-from pipeline.task import PositionTask
+from pipeline.task import Task
 
 Progress = Callable[[int, int, float], None]  # (done, all, best cost so far)
 
@@ -94,7 +94,7 @@ class Problem:
     times: (N + 1,) [s] the knots of the grid on which a global solution is wanted.
     """
 
-    task: PositionTask
+    task: Task
     reference: Reference
     q_init: Array
     times: Array

@@ -41,6 +41,7 @@ def solve(
     own = options.pontryagin
     methods: dict[str, Callable[[], list[Solution]]] = {
         "lsv": lambda: [lsv.solve(problem, options.lsv)],
+        "inertia_weighted": lambda: [lsv.solve(problem, options.inertia_weighted, "inertia_weighted")],
         "pmke": lambda: [pmke.solve(problem, options.pmke)],
         "global": lambda: global_planner.solve(problem, options.global_, config.seed, workers, progress),
         "pareto": lambda: pareto.solve(problem, config.pareto, options.global_, config.seed, workers, progress),

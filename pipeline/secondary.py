@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.arrays import Array
-from pipeline.task import PositionTask
+from pipeline.task import Task
 
 CRITERIA = ("manipulability", "joint_centering")
 
@@ -28,7 +28,7 @@ class Secondary:
     lower: Array
     upper: Array
 
-    def gain(self, task: PositionTask, q: Array) -> tuple[Array, Array]:
+    def gain(self, task: Task, q: Array) -> tuple[Array, Array]:
         """k0 w (K,) and its gradient (K, n) at q (K, n)."""
         value, gradient = np.zeros(len(q)), np.zeros_like(q)
         for criterion in self.criteria:
@@ -40,7 +40,7 @@ class Secondary:
         return value, gradient
 
 
-def manipulability(task: PositionTask, q: Array) -> tuple[Array, Array]:
+def manipulability(task: Task, q: Array) -> tuple[Array, Array]:
     """w = sqrt(det(J J')) (K,), the product of J's singular values (eq. (14); Yoshikawa 1985), and dw/dq (K, n).
 
     d sigma_i = u_i' dJ v_i, and no singular value is divided by: the gradient is finite at a singularity too.

@@ -19,7 +19,7 @@ from scipy.stats import qmc
 from pipeline.arrays import Array
 from pipeline.errors import InputError, PathError
 from pipeline.kinematics import wrap, wrap_angles
-from pipeline.task import PositionTask
+from pipeline.task import Task
 
 CLOSED = 1e-11  # [m] how well a node holds its task point
 LONGEST_STEP = 0.3  # [rad] of the tracing; the Hermite curve through its points is then good to about 1e-5 rad
@@ -64,14 +64,14 @@ def tangent(jacobian: Array) -> Array:
 
 
 def manifold(
-    task: PositionTask, x: Array, rng: np.random.Generator, *, spacing: float = 0.05, seeds: Array | None = None
+    task: Task, x: Array, rng: np.random.Generator, *, spacing: float = 0.05, seeds: Array | None = None
 ) -> list[Loop]:
     """All loops of the manifold of the task point x (m,), nodes `spacing` [rad] apart; see `manifolds`."""
     return manifolds(task, np.asarray(x)[None], rng, spacing=spacing, seeds=seeds)[0]
 
 
 def manifolds(
-    task: PositionTask,
+    task: Task,
     x: Array,
     rng: np.random.Generator,
     *,
@@ -92,7 +92,7 @@ def manifolds(
     traced = _all_loops(task, x, _seeds(task, x, rng, seeds, random_seeds))
     for i in [i for i, loops in enumerate(traced) if not loops]:
         # At a critical value of the kinematics loops meet or shrink to a point: the manifold of a point beside it.
-        for direction in rng.normal(size=(8, task.m)):
+        for direction in rng.normal(size=(8, x.shape[1])):
             beside = x[i : i + 1] + NUDGE * direction / np.linalg.norm(direction)
             traced[i] = traced[i] or _all_loops(task, beside, _seeds(task, beside, rng, seeds, random_seeds))[0]
         if not traced[i]:
@@ -103,13 +103,13 @@ def manifolds(
     return _resample(task, x, traced, spacing)
 
 
-def on_manifold(task: PositionTask, loop: Loop, s: Array, x: Array) -> Array:
+def on_manifold(task: Task, loop: Loop, s: Array, x: Array) -> Array:
     """Configurations (P, n) at arc lengths s (P,) of the loop, closed on its task point x (m,)."""
     return _close(task, loop.interpolate(s), np.broadcast_to(x, (len(s), task.m)), steps=10, tolerance=1e-14)[0]
 
 
 def random_configurations(
-    task: PositionTask, q_init: Array, count: int, rng: np.random.Generator, kind: str = "normal"
+    task: Task, q_init: Array, count: int, rng: np.random.Generator, kind: str = "normal"
 ) -> Array:
     """Distinct configurations (K, n), K <= count, that hold the task point of q_init (n,); q_init comes first. Any r >= 1.
 
@@ -131,8 +131,8 @@ def random_configurations(
         else:
             velocity = 2 * np.pi * (2 * qmc.LatinHypercube(n, rng=rng).random(count) - 1)
         for _ in range(0 if kind == "uniform" else steps):
-            value, jacobian = task.value_and_jacobian(q)
-            q += velocity / steps + _least(jacobian, x - value - (jacobian @ velocity[:, :, None])[:, :, 0] / steps)
+            error, jacobian = task.error_and_jacobian(q, x)
+            q += velocity / steps - _least(jacobian, error + (jacobian @ velocity[:, :, None])[:, :, 0] / steps)
         q, on = _close(task, q, x, steps=30, tolerance=CLOSED)
         for candidate in wrap_angles(q[on], revolute):
             if len(kept) < count and (np.abs(wrap(kept - candidate, revolute)).max(axis=1) > 1e-3).all():
@@ -145,7 +145,7 @@ def random_configurations(
 # --- finding every loop ---------------------------------------------------------------------------------------------
 
 
-def _seeds(task: PositionTask, x: Array, rng: np.random.Generator, given: Array | None, count: int) -> list[Array]:
+def _seeds(task: Task, x: Array, rng: np.random.Generator, given: Array | None, count: int) -> list[Array]:
     """Configurations on the manifold of each point: the given ones first, then random ones."""
     n = task.arm.n
     random = rng.uniform(-np.pi, np.pi, size=(len(x), count, n))
@@ -156,7 +156,7 @@ def _seeds(task: PositionTask, x: Array, rng: np.random.Generator, given: Array 
     return [q[i * split : (i + 1) * split][on[i * split : (i + 1) * split]] for i in range(len(x))]
 
 
-def _all_loops(task: PositionTask, x: Array, seeds: list[Array]) -> list[list[Loop]]:
+def _all_loops(task: Task, x: Array, seeds: list[Array]) -> list[list[Loop]]:
     """Trace one seed per point in step, drop the seeds that lie on it, repeat; then seed from the neighbours' loops."""
     traced: list[list[Loop]] = [[] for _ in x]
     fresh: list[list[Loop]] = [[] for _ in x]
@@ -187,7 +187,7 @@ def _all_loops(task: PositionTask, x: Array, seeds: list[Array]) -> list[list[Lo
         seeds = _unexplained(task, seeds, traced)
 
 
-def _unexplained(task: PositionTask, seeds: list[Array], traced: list[list[Loop]]) -> list[Array]:
+def _unexplained(task: Task, seeds: list[Array], traced: list[list[Loop]]) -> list[Array]:
     """The seeds that do not lie on a traced loop."""
     counts = [len(of_point) for of_point in seeds]
     if not sum(counts):
@@ -217,7 +217,7 @@ def _known(loop: Loop, others: Sequence[Loop]) -> bool:
 # --- tracing --------------------------------------------------------------------------------------------------------
 
 
-def _trace(task: PositionTask, x: Array, seed: Array) -> list[Loop | None]:
+def _trace(task: Task, x: Array, seed: Array) -> list[Loop | None]:
     """The loops through seed (P, n), each at its task point x (P, m); None where a curve does not close."""
     revolute = task.arm.description.revolute
     q, _ = _close(task, seed, x, steps=6, tolerance=CLOSED)
@@ -233,9 +233,8 @@ def _trace(task: PositionTask, x: Array, seed: Array) -> list[Loop | None]:
         h, a, ta = step[live, None], q[live], way[live]
         b = a + h * (ta + 0.5 * h * bend[live])
         for _ in range(2):
-            value, jacobian = task.value_and_jacobian(b)
-            gap = x[live] - value
-            b = b + _least(jacobian, gap)
+            gap, jacobian = task.error_and_jacobian(b, x[live])
+            b = b - _least(jacobian, gap)
         tb = tangent(jacobian)
         chord = b - a
         distance = np.linalg.norm(chord, axis=1)
@@ -272,7 +271,7 @@ def _trace(task: PositionTask, x: Array, seed: Array) -> list[Loop | None]:
     return loops
 
 
-def _resample(task: PositionTask, x: Array, traced: list[list[Loop]], spacing: float) -> list[list[Loop]]:
+def _resample(task: Task, x: Array, traced: list[list[Loop]], spacing: float) -> list[list[Loop]]:
     """The same loops with evenly spaced nodes, closed on their task points; all nodes of all points in one batch."""
     counts = [[2 * max(4, int(np.ceil(loop.length / spacing / 2))) for loop in loops] for loops in traced]
     even = [
@@ -302,17 +301,16 @@ def _resample(task: PositionTask, x: Array, traced: list[list[Loop]], spacing: f
     return out
 
 
-def _close(task: PositionTask, q: Array, x: Array, *, steps: int, tolerance: float) -> tuple[Array, NDArray[np.bool_]]:
+def _close(task: Task, q: Array, x: Array, *, steps: int, tolerance: float) -> tuple[Array, NDArray[np.bool_]]:
     """Newton steps of least length from q (P, n) to the task points x (P, m), only where still needed; q, success."""
     q, open_ = q.copy(), np.arange(len(q))
     for _ in range(steps + 1):
-        value, jacobian = task.value_and_jacobian(q[open_])
-        gap = x[open_] - value
+        gap, jacobian = task.error_and_jacobian(q[open_], x[open_])
         far = np.linalg.norm(gap, axis=1) > tolerance
         open_ = open_[far]
         if not open_.size:
             break
-        move = _least(jacobian[far], gap[far])
+        move = -_least(jacobian[far], gap[far])
         q[open_] += move * np.minimum(1.0, 0.5 / np.maximum(np.linalg.norm(move, axis=1, keepdims=True), 1e-300))
     return q, ~np.isin(np.arange(len(q)), open_)
 

@@ -78,6 +78,6 @@ class Window:
         return cost / self._scale, (total[:, None, :] @ self._to_velocity).ravel() / self._scale
 
     def _tracking(self, w: Array) -> tuple[Array, Array]:
-        x, jacobian = self.task.value_and_jacobian(self._motion(w)[0])
+        error, jacobian = self.task.error_and_jacobian(self._motion(w)[0], self._x_ref)
         rows = self.dt * (jacobian[:, None] @ self._to_velocity) * self._earlier  # by knot, earlier interval, m, n
-        return (x - self._x_ref).ravel(), rows.swapaxes(1, 2).reshape(self.horizon * self.task.m, -1)
+        return error.ravel(), rows.swapaxes(1, 2).reshape(self.horizon * self.task.m, -1)

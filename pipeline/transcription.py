@@ -295,19 +295,18 @@ class Transcription:
         self.program.AddConstraint(constraint, np.append(self.u[block].ravel(), total))
 
     def _add_tracking(self, knots: Block) -> None:
-        """x(q_i) = x_ref,i."""
+        """x(q_i) = x_ref,i, and for poses R(q_i) = R_ref,i."""
         task, count, n, m = self.problem.task, len(knots), self.n, self.problem.task.m
-        diagonal = np.arange(count)
+        diagonal, target = np.arange(count), self.x_ref[knots]
 
         def position(x: Array) -> tuple[Array, Array]:
-            value, jacobian = task.value_and_jacobian(x.reshape(count, n) / POSITION_SCALE)
+            value, jacobian = task.error_and_jacobian(x.reshape(count, n) / POSITION_SCALE, target)
             rows = np.zeros((count, m, count, n))
             rows[diagonal, :, diagonal] = jacobian / POSITION_SCALE
             return value.ravel(), rows.reshape(count * m, count * n)
 
         pattern = [(k * m + i, k * n + j) for k in range(count) for i in range(m) for j in range(n)]
-        target = self.x_ref[knots].ravel()
-        self._tracking_rows.append(self._add_rows(position, target, self.y[knots].ravel(), pattern))
+        self._tracking_rows.append(self._add_rows(position, np.zeros(count * m), self.y[knots].ravel(), pattern))
 
     def _add_torque(self, block: Block) -> None:
         """u_i = s_i (M(q_i) qdd_i + n(q_i, qd_i)), with qd_(i-1) from the interval before."""

@@ -97,8 +97,8 @@ def test_between_the_knots_of_an_exact_motion_there_is_no_error(
     moved = knots.copy()
     moved[3] += 0.05 * np.cross(*jacobian) / np.linalg.norm(np.cross(*jacobian))
     for _ in range(8):
-        x, jacobian = (value[0] for value in task.value_and_jacobian(moved[3:4]))
-        moved[3] += np.linalg.pinv(jacobian) @ (task.value(knots[3:4])[0] - x)
+        error, jacobian = (value[0] for value in task.error_and_jacobian(moved[3:4], task.value(knots[3:4])))
+        moved[3] -= np.linalg.pinv(jacobian) @ error
     other = evaluate(asked, solution(moved))
     assert other.tracking_error.max() < 1e-12
     assert other.tracking_error_between > 1e-4

@@ -6,6 +6,7 @@ import colorsys
 
 METHOD_COLORS = {
     "lsv": "#D9601A",
+    "inertia_weighted": "#0E7490",
     "pmke": "#2B6CB0",
     "global": "#2F855A",
     "calculus_of_variations": "#6B46C1",
@@ -16,6 +17,7 @@ METHOD_COLORS = {
 }
 METHOD_NAMES = {
     "lsv": "LSV",
+    "inertia_weighted": "Inertia-weighted",
     "pmke": "PMKE",
     "global": "Global optimum",
     "calculus_of_variations": "Calculus of variations",

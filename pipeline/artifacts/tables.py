@@ -20,6 +20,7 @@ from pipeline.extras import Extras
 from pipeline.files import write_beside
 from pipeline.front import hypervolume
 from pipeline.problem import Problem, Solution
+from pipeline.task import PositionTask
 
 UNITS = {
     "kinetic_energy_integral": "J s",
@@ -28,6 +29,8 @@ UNITS = {
     "max_tracking_error": "m",
     "max_tracking_error_between": "m",
     "final_error": "m",
+    "max_orientation_error": "rad",
+    "max_orientation_error_between": "rad",
     "velocity_norm_integral": "rad²/s",
     "peak_velocity": "rad/s",
     "peak_torque": "N m",
@@ -72,6 +75,15 @@ def _first_order(problem: Problem, e: Evaluation) -> dict[str, Any]:
     }
 
 
+def _orientation(problem: Problem, e: Evaluation) -> dict[str, Any]:
+    if isinstance(problem.task, PositionTask):
+        return {}
+    return {
+        "max_orientation_error": e.orientation_error.max(),
+        "max_orientation_error_between": e.orientation_error_between,
+    }
+
+
 def _row(problem: Problem, e: Evaluation) -> dict[str, Any]:
     radius = int(np.argmin(e.spectral_radius))
     row: dict[str, Any] = {
@@ -86,6 +98,7 @@ def _row(problem: Problem, e: Evaluation) -> dict[str, Any]:
         "max_tracking_error": e.tracking_error.max(),
         "max_tracking_error_between": e.tracking_error_between,
         "final_error": e.tracking_error[-1],
+        **_orientation(problem, e),
     }
     for name, values in (("velocity", e.qd), ("torque", e.tau), ("power", e.power)):
         row |= {f"peak_{name}_{j + 1}": peak for j, peak in enumerate(np.abs(values).max(axis=0))}

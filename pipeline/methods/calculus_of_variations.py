@@ -118,10 +118,9 @@ def _families(problem: Problem, options: CalculusOfVariationsOptions) -> list[_F
 
     def least_energy(q: Array) -> Array:
         jacobian = task.jacobian(q)
+        wanted = task.velocity(q, np.repeat(xd, len(q), axis=0))
         right = np.linalg.solve(lagrangian.metric(q), np.swapaxes(jacobian, 1, 2))
-        return (right @ np.linalg.solve(jacobian @ right, np.broadcast_to(xd[0, :, None], (len(q), task.m, 1))))[
-            :, :, 0
-        ]
+        return (right @ np.linalg.solve(jacobian @ right, wanted[:, :, None]))[:, :, 0]
 
     loops = manifold(task, x[0], np.random.default_rng(0), spacing=options.spacing, seeds=problem.q_init[None])
     if problem.boundary is Boundary.FREE:
@@ -274,7 +273,8 @@ def rate(problem: Problem, t: Array, state: Array) -> Array:
     q, qd = state[:, :n], state[:, n : 2 * n]
     lagrangian = Lagrangian(task, problem.objective)
     jacobian, metric = task.jacobian(q), lagrangian.metric(q)
-    wanted = problem.reference.sample(t)[2] - task.jacobian_rate_term(q, qd)
+    _, xd_ref, xdd_ref = problem.reference.sample(t)
+    wanted = task.acceleration(q, qd, xd_ref, xdd_ref) - task.jacobian_rate_term(q, qd)
     bias, inverse = lagrangian.bias(q, qd), np.linalg.inv(metric)
     right = inverse @ np.swapaxes(jacobian, 1, 2)
     free = -(inverse @ bias[:, :, None])
@@ -324,8 +324,9 @@ def _integrate(
 def _back_on_path(problem: Problem, t: Array, state: Array) -> Array:
     n = problem.task.arm.n
     x_ref, xd_ref, _ = problem.reference.sample(t)
-    x, jacobian = problem.task.value_and_jacobian(state[:, :n])
+    error, jacobian = problem.task.error_and_jacobian(state[:, :n], x_ref)
     inverse = pseudoinverse(jacobian)
-    state[:, :n] += (inverse @ (x_ref - x)[:, :, None])[:, :, 0]
-    state[:, n : 2 * n] += (inverse @ (xd_ref[:, :, None] - jacobian @ state[:, n : 2 * n, None]))[:, :, 0]
+    xd = problem.task.velocity(state[:, :n], xd_ref)
+    state[:, :n] -= (inverse @ error[:, :, None])[:, :, 0]
+    state[:, n : 2 * n] += (inverse @ (xd[:, :, None] - jacobian @ state[:, n : 2 * n, None]))[:, :, 0]
     return state

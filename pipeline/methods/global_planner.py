@@ -210,8 +210,10 @@ def stays_on_path(problem: Problem, times: Array, q: Array) -> bool:
     A finite-difference program also has optima that jump to another branch of the manifold within one interval.
     """
     middle = (times[1:] + times[:-1]) / 2
-    gap = problem.task.value(CubicSpline(times, q)(middle)) - problem.reference.position(middle)
-    return bool(np.linalg.norm(gap, axis=1).max() <= 0.01 * problem.reference.geometry.length)
+    gap = problem.task.error(CubicSpline(times, q)(middle), problem.reference.position(middle))
+    return bool(
+        np.linalg.norm(gap[:, : len(problem.task.axes)], axis=1).max() <= 0.01 * problem.reference.geometry.length
+    )
 
 
 def _basins(problem: Problem, starts: list[Optimum], options: GlobalOptions) -> list[int]:

@@ -1,6 +1,8 @@
-"""LSV, the baseline: least-squares joint velocities qd = J+ xd, integrated in time (PMKE paper eq. (2), qd_0 = 0).
+"""The velocity-level baselines, integrated in time: least joint velocities and least instantaneous kinetic energy.
 
-The paper prints J+ = (J'J)^-1 J'; the right inverse of a wide Jacobian is J+ = J'(J J')^-1, which is used here.
+`lsv`: qd = J+ xd, least squares (PMKE paper eq. (2), qd_0 = 0). The paper prints J+ = (J'J)^-1 J'; the right inverse of a
+wide Jacobian is J+ = J'(J J')^-1, which is used here.
+`inertia_weighted`: qd = M^-1 J'(J M^-1 J')^-1 xd, least qd'M qd at every instant (Whitney 1969; Global paper eq. (10)).
 """
 
 from __future__ import annotations
@@ -9,12 +11,15 @@ import numpy as np
 
 from pipeline.arrays import Array
 from pipeline.config import LsvOptions
-from pipeline.kinematics import SingularityWatch, pseudoinverse
+from pipeline.kinematics import SingularityWatch, pseudoinverse, weighted_pseudoinverse
 from pipeline.problem import Problem, Solution, Trajectory
 
 
-def solve(problem: Problem, options: LsvOptions = LsvOptions()) -> Solution:
-    """Integrate from q_init with steps of options.dt; a singular configuration on the way is reported with its time."""
+def solve(problem: Problem, options: LsvOptions = LsvOptions(), method: str = "lsv") -> Solution:
+    """Integrate from q_init with steps of options.dt; a singular configuration on the way is reported with its time.
+
+    method: lsv or inertia_weighted.
+    """
     task, reference = problem.task, problem.reference
     steps = max(1, round(reference.duration / options.dt))
     time = np.linspace(0.0, reference.duration, steps + 1)
@@ -22,19 +27,23 @@ def solve(problem: Problem, options: LsvOptions = LsvOptions()) -> Solution:
     x_ref, xd_ref, _ = reference.sample(time)
     watch = SingularityWatch(options.singular_value, options.max_drift)
 
-    def velocity(i: int, jacobian: Array, correction: Array) -> Array:
+    def velocity(i: int, q: Array, jacobian: Array, correction: Array) -> Array:
         watch.see(time[i], jacobian)
-        return np.asarray(pseudoinverse(jacobian) @ (xd_ref[i] + correction))
+        if method == "inertia_weighted":
+            inverse = weighted_pseudoinverse(jacobian, np.linalg.inv(task.arm.mass_matrix(q[None])[0]))
+        else:
+            inverse = pseudoinverse(jacobian)
+        return np.asarray(inverse @ (task.velocity(q[None], xd_ref[i : i + 1])[0] + correction))
 
     q = np.empty((steps + 1, task.arm.n))
     q[0] = problem.q_init
     for i in range(steps):
-        x, jacobian = task.value_and_jacobian(q[i][None])
+        error, jacobian = task.error_and_jacobian(q[i : i + 1], x_ref[i : i + 1])
         # Once per step: the predicted point below is off by more than the drift that is to be corrected.
-        correction = options.gain * (x_ref[i] - x[0])
-        slope = velocity(i, jacobian[0], correction)
+        correction = -options.gain * error[0]
+        slope = velocity(i, q[i], jacobian[0], correction)
         if options.integrator == "heun":
-            ahead = task.jacobian((q[i] + dt * slope)[None])[0]
-            slope = (slope + velocity(i + 1, ahead, correction)) / 2
+            ahead = q[i] + dt * slope
+            slope = (slope + velocity(i + 1, ahead, task.jacobian(ahead[None])[0], correction)) / 2
         q[i + 1] = q[i] + dt * slope
-    return watch.judge("lsv", Trajectory(time, q), {"steps": steps, "integrator": options.integrator})
+    return watch.judge(method, Trajectory(time, q), {"steps": steps, "integrator": options.integrator})

@@ -44,11 +44,11 @@ def solve(problem: Problem, options: PmkeOptions = PmkeOptions()) -> Solution:
         if prediction is None or ((i - 1) % update == 0 and now + window <= duration + 1e-9):
             acceleration = (qd[i - 1] - qd[i - 2]) / dt if i > 1 else np.zeros(task.arm.n)
             prediction = predictor(now, q[i - 1], qd[i - 1], acceleration)
-        x, jacobian = task.value_and_jacobian(q[i - 1][None])
+        error, jacobian = task.error_and_jacobian(q[i - 1][None], x_ref[i - 1][None])
         inverse = pseudoinverse(jacobian[0])
         watch.see(now, jacobian[0])
         # Step 7, eq. (2): follow the path, and in the null space the prediction.
-        command = xd_ref[i] + options.gain * (x_ref[i - 1] - x[0])
+        command = task.velocity(q[i - 1][None], xd_ref[i][None])[0] - options.gain * error[0]
         toward = (prediction(min(time[i], prediction.t[-1])) - q[i - 1]) / dt
         qd[i] = inverse @ command + toward - inverse @ (jacobian[0] @ toward)
         q[i] = q[i - 1] + dt * qd[i]

@@ -28,6 +28,7 @@ from pipeline.maximum_principle import costates, null_space, rates, transversali
 from pipeline.parallel import Workers
 from pipeline.problem import Boundary, Problem, Progress, Solution, Status, Trajectory, no_progress
 from pipeline.second_variation import morse_index
+from pipeline.task import PoseTask
 
 ROUGH_TOLERANCE = 1e-4  # enough to tell extremals apart
 ROUGH_NODES = 400
@@ -41,13 +42,15 @@ LARGEST = 1e8  # a Newton step may go far astray; Drake must not see what is not
 
 def check(problem: Problem) -> None:
     """Refuse problems that this method does not serve; raises InputError."""
-    supported = "supported are objectives of first order, boundary free or fixed, and no limits"
+    supported = "supported are objectives of first order, boundary free or fixed, positions only, and no limits"
     if problem.objective.torque or not Lagrangian(problem.task, problem.objective).is_quadratic:
         raise InputError(f"pontryagin: the objective holds a torque integral; {supported}")
     if problem.boundary is Boundary.CYCLIC:
         raise InputError(f"pontryagin: the boundary is cyclic; {supported}")
     if problem.bounds.any:
         raise InputError(f"pontryagin: the problem has limits; {supported}")
+    if isinstance(problem.task, PoseTask):
+        raise InputError(f"pontryagin: the task prescribes orientations; {supported}")
 
 
 def as_printed(problem: Problem, options: PontryaginOptions = PontryaginOptions()) -> list[Solution]:
@@ -66,7 +69,7 @@ def as_printed(problem: Problem, options: PontryaginOptions = PontryaginOptions(
     for k in range(1, steps + 1):
         qd, slope = rates(lagrangian, xd[k : k + 1], q[k - 1 : k], costate)
         q[k], costate = q[k - 1] + (time[k] - time[k - 1]) * qd[0], costate + (time[k] - time[k - 1]) * slope
-    gap = float(np.linalg.norm(problem.task.value(q[-1:])[0] - problem.reference.position(time[-1:])[0]))
+    gap = float(np.linalg.norm(problem.task.error(q[-1:], problem.reference.position(time[-1:]))))
     left = transversality(lagrangian, q[-1], costate[0])
     message = (
         f"solved as the report prints it: {gap:.3g} m off at the end, |(I - J+J) lambda(T)| = {left:.3g} instead of 0"
@@ -212,7 +215,7 @@ def _collocate(problem: Problem, times: Array, guess: Array, tolerance: float, n
     """solve_bvp on states [q; lambda] (2 n, K)."""
     task, n = problem.task, problem.task.arm.n
     lagrangian = Lagrangian(task, problem.objective)
-    start = problem.reference.position(np.zeros(1))[0]
+    start = problem.reference.position(np.zeros(1))
     basis = null_space(task.jacobian(guess[:n, :1].T))[0]
 
     def flow(t: Array, y: Array) -> Array:
@@ -224,9 +227,9 @@ def _collocate(problem: Problem, times: Array, guess: Array, tolerance: float, n
         if problem.boundary is Boundary.FIXED:
             return np.concatenate([first[:n] - problem.q_init, last[n:]])
         q = np.clip(np.nan_to_num(first[:n]), -LARGEST, LARGEST)[None]
-        x, jacobian = task.value_and_jacobian(q)
+        x, jacobian = task.error_and_jacobian(q, start)
         free = first[n:] - pseudoinverse(jacobian[0]) @ jacobian[0] @ first[n:]
-        return np.concatenate([x[0] - start, basis.T @ free, last[n:]])
+        return np.concatenate([x[0], basis.T @ free, last[n:]])
 
     with np.errstate(all="ignore"):  # of guesses that lead nowhere
         result = solve_bvp(flow, ends, times, guess, tol=tolerance, max_nodes=nodes)
