@@ -25,6 +25,12 @@ BLOCK = 16  # copies per plant: beyond this Drake's cost per knot no longer fall
 _STEP = 1e-5  # central differences of smooth rigid-body functions: truncation and rounding balance near 1e-10
 
 
+def weld_base(plant: Any, description: Description, model: Any) -> None:
+    """Fix the root of a description that was parsed as `model` to the world."""
+    if description.base != "world":  # which Drake takes for its own world
+        plant.WeldFrames(plant.world_frame(), plant.GetFrameByName(description.base, model))
+
+
 class _Stack:
     """`size` copies of one arm in one plant, with a context of its own."""
 
@@ -36,8 +42,7 @@ class _Stack:
         self.tips, joints = [], []
         for _ in range(size):
             (model,) = parser.AddModelsFromString(description.xml, "urdf")
-            if description.base != "world":  # which Drake takes for its own world
-                plant.WeldFrames(plant.world_frame(), plant.GetFrameByName(description.base, model))
+            weld_base(plant, description, model)
             tip = plant.GetFrameByName(description.end_effector, model)
             if np.any(offset):
                 tip = plant.AddFrame(FixedOffsetFrame("end_effector_point", tip, RigidTransform(offset), model))

@@ -25,6 +25,7 @@ from pipeline.schema import (
     part,
     per_joint,
     switch,
+    table_of,
     table_of_numbers,
     text,
 )
@@ -44,6 +45,38 @@ DEFAULT_METHODS = ("lsv", "pmke", "global")
 
 
 @dataclass(frozen=True)
+class SphereConfig:
+    """A sphere."""
+
+    kind: str = fixed("sphere")
+    center: list[float] = numbers([0.0, 0.0, 0.0], length=3, unit="m")
+    radius: float = number(0.1, above=0, unit="m")
+
+
+@dataclass(frozen=True)
+class BoxConfig:
+    """A box: its edges, and roll, pitch, yaw."""
+
+    kind: str = fixed("box")
+    center: list[float] = numbers([0.0, 0.0, 0.0], length=3, unit="m")
+    size: list[float] = numbers([0.1, 0.1, 0.1], length=3, above=0, unit="m")
+    rpy: list[float] = numbers([0.0, 0.0, 0.0], length=3, unit="rad")
+
+
+@dataclass(frozen=True)
+class CapsuleConfig:
+    """All points within `radius` of the segment from start to end."""
+
+    kind: str = fixed("capsule")
+    start: list[float] = numbers([0.0, 0.0, 0.0], length=3, unit="m")
+    end: list[float] = numbers([0.0, 0.0, 0.1], length=3, unit="m")
+    radius: float = number(0.1, above=0, unit="m")
+
+
+SHAPES = {"sphere": SphereConfig, "box": BoxConfig, "capsule": CapsuleConfig}
+
+
+@dataclass(frozen=True)
 class RobotConfig:
     """Group `robot`: the description, the end effector, what of it is prescribed, and where the arm starts."""
 
@@ -55,6 +88,7 @@ class RobotConfig:
     task: list[str] = choices(["x", "y"], "x", "y", "z")
     orientation: str = choice("none", "none", "full", "pointing")
     pointing: list[float] = numbers([0.0, 0.0, 1.0], length=3)
+    collision: dict[str, list[SphereConfig | BoxConfig | CapsuleConfig]] | None = table_of(SHAPES, listed=True)
     q_init: list[float] = numbers([0.0, 0.327, -0.754], unit="rad")
     locked: dict[str, float] | None = mapping(any_number, optional=True)
 
@@ -172,6 +206,15 @@ class LimitsConfig:
     velocity: float | list[float] | None = per_joint(above=0, unit="rad/s")
     torque: float | list[float] | None = per_joint(above=0, unit="N m")
     power: float | list[float] | None = per_joint(above=0, unit="W")
+
+
+@dataclass(frozen=True)
+class ObstaclesConfig:
+    """Group `obstacles`: solids in the world, by name, and the clearance that moving links keep from them."""
+
+    margin: float = number(0.02, above=0, unit="m")
+    influence: float = number(0.05, above=0, unit="m")
+    shapes: dict[str, SphereConfig | BoxConfig | CapsuleConfig] = table_of(SHAPES)
 
 
 @dataclass(frozen=True)
@@ -339,6 +382,7 @@ class RunConfig:
     )
     limits: LimitsConfig = part(LimitsConfig)
     boundary: BoundaryConfig = part(BoundaryConfig)
+    obstacles: ObstaclesConfig = part(ObstaclesConfig)
     method: MethodConfig = part(MethodConfig)
     parallel: ParallelConfig = part(ParallelConfig)
     sweep: SweepConfig = part(SweepConfig)

@@ -31,11 +31,14 @@ class Costs:
 def velocities(problem: Problem, times: Array, q: Array) -> Array:
     """qd (..., N + 1, n) of motions q (..., N + 1, n): qd_i = (q_i - q_(i-1)) / dt_i.
 
-    qd_0 is zero for a motion from rest, qd_N for a cyclic one, and qd_1 for a path that is entered at speed.
+    qd_0 is problem.qd_init if that is given, zero for a motion from rest, qd_N for a cyclic one, and qd_1 for a path that
+    is entered at speed.
     """
     step = np.diff(q, axis=-2) / np.diff(times)[:, None]
     if problem.boundary is Boundary.CYCLIC:
         first = step[..., -1:, :]
+    elif problem.qd_init is not None:
+        first = np.broadcast_to(problem.qd_init, step[..., :1, :].shape)
     else:
         first = np.zeros_like(step[..., :1, :]) if problem.reference.timing.at_rest else step[..., :1, :]
     return np.concatenate([first, step], axis=-2)

@@ -18,10 +18,12 @@ from scipy.spatial.transform import Rotation
 
 from pipeline.arm import Arm
 from pipeline.arrays import Array
+from pipeline.clearance import Clearance
 from pipeline.problem import Boundary, Problem, Solution, Status, Trajectory
 from pipeline.task import PositionTask, Task
 
 LIMITS = 1e-6  # relative: how well a method that promises limits must keep them at its knots
+CLEARANCES = 5  # of those at which distances from obstacles are taken
 BETWEEN = 10  # sub-intervals per knot interval on which the motion between knots is judged
 
 
@@ -58,6 +60,8 @@ class Evaluation:
     energy_integral_spline: float  # of the cubic spline through the knots, independent of the grid's quadrature
     tracking_error_between: float  # largest between knots, along that spline
     orientation_error_between: float
+    clearance: Array  # (N + 1,) [m] smallest distance of a moving link from an obstacle; infinite without obstacles
+    clearance_between: float  # smallest along that spline
     limit_excess: dict[str, float]  # by kind, at the knots, relative; see limit_excess()
     limit_excess_between: dict[str, float]  # the same along that spline
 
@@ -98,9 +102,11 @@ def evaluate(problem: Problem, solution: Solution) -> Evaluation:
     # At the first knot nothing has been spent yet: the interval's values stand at its end.
     tau[0] = tau[0] if problem.boundary is Boundary.CYCLIC else 0.0
     position = skeleton[:, -1]
-    excess = limit_excess(problem, q, qd, tau)
-    spline_integral, spline_objective, between, turned_between, excess_between = _between_knots(
-        problem, plant, trajectory, qd[0]
+    scene = None if problem.obstacles is None else Clearance(arm, problem.obstacles)
+    clearance = _clearance(scene, q)
+    excess = limit_excess(problem, q, qd, tau, float(clearance.min()))
+    spline_integral, spline_objective, between, turned_between, clear_between, excess_between = _between_knots(
+        problem, plant, scene, trajectory, qd[0]
     )
     secondary = np.array([plant.secondary(problem, qi) for qi in q]) if problem.objective.secondary else np.zeros(count)
     energy_integral, torque_integral = _running(energy, dt), _running((tau**2).sum(axis=1), dt)
@@ -141,6 +147,8 @@ def evaluate(problem: Problem, solution: Solution) -> Evaluation:
         energy_integral_spline=spline_integral,
         tracking_error_between=between,
         orientation_error_between=turned_between,
+        clearance=clearance,
+        clearance_between=clear_between,
         limit_excess=excess,
         limit_excess_between=excess_between,
     )
@@ -198,13 +206,13 @@ def _judge(
 
 
 def _between_knots(
-    problem: Problem, plant: _Plant, trajectory: Trajectory, qd_start: Array
-) -> tuple[float, float, float, float, dict[str, float]]:
+    problem: Problem, plant: _Plant, scene: Clearance | None, trajectory: Trajectory, qd_start: Array
+) -> tuple[float, float, float, float, float, dict[str, float]]:
     """The cubic spline through the knots: kinetic-energy integral (Simpson), objective, largest tracking and orientation
-    errors, excess of limits.
+    errors, smallest clearance, excess of limits.
     """
     if not np.all(np.isfinite(trajectory.q)) or len(trajectory.time) < 4:
-        return float("nan"), float("nan"), float("nan"), float("nan"), {}
+        return float("nan"), float("nan"), float("nan"), float("nan"), float("nan"), {}
     # Only torques tie the first velocity to rest; the energy's sum lets it jump, and nothing prescribes the last one.
     torque_counts = problem.objective.torque > 0 or bool(np.isfinite(problem.bounds.torque).any())
     rest = problem.reference.timing.at_rest and problem.boundary is not Boundary.CYCLIC and torque_counts
@@ -229,13 +237,26 @@ def _between_knots(
         float(rate.reshape(len(dt), -1) @ weights @ dt) for rate in (energy, (qd**2).sum(axis=1), secondary)
     )
     objective = _weighted(problem, integral, float("nan"), norm, gain)
-    return integral, objective, float(error.max()), float(turned.max()), limit_excess(problem, q, qd, tau)
+    clear = float(_clearance(scene, q[:: BETWEEN // CLEARANCES]).min())
+    excess = limit_excess(problem, q, qd, tau, clear)
+    return integral, objective, float(error.max()), float(turned.max()), clear, excess
 
 
-def limit_excess(problem: Problem, q: Array, qd: Array, tau: Array) -> dict[str, float]:
-    """By how much each kind of limit is exceeded, relative to its size (positions: to half the range); <= 0 if kept."""
+def _clearance(scene: Clearance | None, q: Array) -> Array:
+    if scene is None:
+        return np.full(len(q), np.inf)
+    finite = np.isfinite(q).all(axis=1)
+    clearance = np.full(len(q), np.nan)
+    clearance[finite] = scene.smallest(q[finite])
+    return clearance
+
+
+def limit_excess(problem: Problem, q: Array, qd: Array, tau: Array, clearance: float = np.inf) -> dict[str, float]:
+    """By how much each kind of limit is exceeded, relative to its size (positions: to half the range; clearances: to the
+    margin); <= 0 if kept.
+    """
     limits = problem.bounds
-    if not limits.any or not np.all(np.isfinite(q)):
+    if not problem.constrained or not np.all(np.isfinite(q)):
         return {}
     half = np.where(np.isfinite(limits.upper - limits.lower), (limits.upper - limits.lower) / 2, 1.0)
     kinds = {
@@ -244,7 +265,10 @@ def limit_excess(problem: Problem, q: Array, qd: Array, tau: Array) -> dict[str,
         "torque": (np.abs(tau) / limits.torque - 1, limits.torque),
         "power": (np.abs(tau * qd) / limits.power - 1, limits.power),
     }
-    return {kind: float(excess.max()) for kind, (excess, bound) in kinds.items() if np.isfinite(bound).any()}
+    found = {kind: float(excess.max()) for kind, (excess, bound) in kinds.items() if np.isfinite(bound).any()}
+    if problem.obstacles is not None:
+        found["clearance"] = 1 - clearance / problem.obstacles.margin
+    return found
 
 
 class _Plant:

@@ -6,12 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipeline.arm import Arm
 from pipeline.arrays import Array
+from pipeline.clearance import Clearance, Obstacles
 from pipeline.costs import integrals, velocities
 from pipeline.problem import Problem
 from pipeline.transcription import Transcription
 
-UNITS = {"position": "rad", "velocity": "rad/s", "torque": "N m", "power": "W"}
+UNITS = {"position": "rad", "velocity": "rad/s", "torque": "N m", "power": "W", "clearance": "m"}
 
 
 @dataclass(frozen=True)
@@ -51,7 +53,18 @@ def violations(problem: Problem, times: Array, q: Array) -> list[Violation]:
         ("power", np.abs(tau * qd), limits.power),
     ):
         found.append(_worst(kind, names, times, values, bound, bound, 1.0))
+    if problem.obstacles is not None:
+        found.append(_closest(problem.task.arm, problem.obstacles, times, q))
     return [violation for violation in found if violation is not None]
+
+
+def _closest(arm: Arm, obstacles: Obstacles, times: Array, q: Array) -> Violation:
+    clearance = Clearance(arm, obstacles)
+    closest = [clearance.closest(one) for one in q]
+    knot = int(np.argmin([distance for distance, _, _ in closest]))
+    distance, link, obstacle = closest[knot]
+    excess = (obstacles.margin - distance) / obstacles.margin
+    return Violation("clearance", f"{link} from {obstacle}", obstacles.margin, distance, float(times[knot]), excess)
 
 
 def _worst(

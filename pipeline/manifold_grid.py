@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.arrays import Array
+from pipeline.clearance import Clearance
 from pipeline.lagrangian import Lagrangian
 from pipeline.problem import Boundary, Problem
 from pipeline.self_motion import manifolds
@@ -123,6 +124,9 @@ def make_grid(problem: Problem, times: Array, nodes: int, velocity_slack: float 
     turns = np.floor((flat - lowest + 1e-9) / (2 * np.pi))
     flat = flat - np.where(held, 2 * np.pi * turns, 0.0)
     within = np.all(turning | ((flat <= bounds.upper + 1e-9) & (flat >= bounds.lower - 1e-9)), axis=1)
+    if problem.obstacles is not None:
+        clearance = Clearance(task.arm, problem.obstacles)
+        within &= clearance.smallest(flat) >= problem.obstacles.margin
     lagrangian = Lagrangian(task, problem.objective)
     root, gain = np.linalg.cholesky(lagrangian.metric(flat)), lagrangian.gain(flat)[0]
     ends = np.cumsum([len(of_knot) for of_knot in q])[:-1]

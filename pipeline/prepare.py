@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path as File
@@ -13,7 +14,9 @@ from scipy.spatial.transform import Rotation
 from pipeline import config as schema
 from pipeline.arm import Arm
 from pipeline.arrays import Array
+from pipeline.clearance import Clearance, Obstacles
 from pipeline.errors import ConfigError, PathError, RobotError
+from pipeline.geometry import Shape, capsule
 from pipeline.kinematics import place, project
 from pipeline.path import (
     ConstantSpeed,
@@ -46,6 +49,8 @@ def prepare(config: schema.RunConfig) -> Problem:
     """The problem that a configuration states; raises InputError, one line, if it cannot be posed."""
     robot = config.robot
     arm = Arm.from_urdf(find(robot.urdf), robot.end_effector, base=robot.base, offset=robot.offset, locked=robot.locked)
+    if robot.collision is not None:
+        arm.description = replace(arm.description, collision=_link_shapes(robot.collision, arm))
     task = _task(robot, arm)
     if len(robot.q_init) != arm.n:
         names = ", ".join(arm.description.joints)
@@ -61,6 +66,7 @@ def prepare(config: schema.RunConfig) -> Problem:
         objective=_objective(config, arm),
         limits=_limits(config.limits, arm),
         boundary=Boundary(config.boundary.kind),
+        obstacles=_obstacles(config.obstacles, arm),
     )
     _check(problem)
     _require_reach(problem)
@@ -121,6 +127,39 @@ def _objective(config: schema.RunConfig, arm: Arm) -> Objective:
     return Objective(*own.weights, Secondary(own.criteria, own.k0, ranges.lower, ranges.upper))
 
 
+def _shape(name: str, shape: Any, frame: str | None = None) -> Shape:
+    if isinstance(shape, schema.CapsuleConfig):
+        return capsule(name, np.array(shape.start), np.array(shape.end), shape.radius, frame)
+    center = tuple(shape.center)
+    if isinstance(shape, schema.SphereConfig):
+        return Shape(name, "sphere", (shape.radius,), center, frame=frame)
+    turn = tuple(Rotation.from_euler("xyz", shape.rpy).as_rotvec().tolist())
+    return Shape(name, "box", tuple(shape.size), center, turn, frame)
+
+
+def _link_shapes(table: dict[str, list[Any]], arm: Arm) -> tuple[Shape, ...]:
+    """The shapes that the configuration gives the links, in place of those of the description."""
+    links = arm.description.links
+    for link in table:
+        if link not in links:
+            close = difflib.get_close_matches(link, links, n=3, cutoff=0.4) or list(links)[:12]
+            raise ConfigError(f"robot.collision.{link}: no such link; did you mean {', '.join(close)}?")
+    return tuple(_shape(link, shape, link) for link, shapes in table.items() for shape in shapes)
+
+
+def _obstacles(obstacles: schema.ObstaclesConfig, arm: Arm) -> Obstacles | None:
+    if not obstacles.shapes:
+        return None
+    if not arm.description.collision:
+        meshes = f" (those of {', '.join(arm.description.meshes)} are meshes)" if arm.description.meshes else ""
+        raise ConfigError(
+            f"obstacles.shapes: {arm.description.name} has no primitive collision shapes{meshes}; give spheres, boxes or "
+            "capsules in robot.collision"
+        )
+    shapes = tuple(_shape(name, shape) for name, shape in obstacles.shapes.items())
+    return Obstacles(shapes, obstacles.margin, obstacles.influence)
+
+
 def _check(problem: Problem) -> None:
     """Refuse what no motion can meet: contradicting limits, a fixed start outside them, an open path for a cycle."""
     limits, names = problem.bounds, problem.task.arm.description.joints
@@ -138,6 +177,13 @@ def _check(problem: Problem) -> None:
                 f"robot.q_init of {names[joint]} is {problem.q_init[joint]:.4g}, outside its limits "
                 f"{limits.lower[joint]:.4g} to {limits.upper[joint]:.4g}, and boundary = fixed starts there"
             )
+        if problem.obstacles is not None:
+            distance, link, obstacle = Clearance(problem.task.arm, problem.obstacles).closest(problem.q_init)
+            if distance < problem.obstacles.margin:
+                raise ConfigError(
+                    f"robot.q_init: {link} is {distance:.3g} m from obstacle {obstacle}, less than obstacles.margin = "
+                    f"{problem.obstacles.margin:g} m, and boundary = fixed starts there"
+                )
     if problem.boundary is Boundary.CYCLIC:
         ends = problem.reference.position(np.array([0.0, problem.reference.duration]))
         gap = float(np.linalg.norm(ends[1] - ends[0]))

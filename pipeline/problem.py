@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from pipeline.arrays import Array
+from pipeline.clearance import Obstacles
 from pipeline.path import Reference
 from pipeline.secondary import Secondary
 from pipeline.task import Task
@@ -43,7 +44,7 @@ class Objective:
     secondary: Secondary | None = None
 
 
-LIMIT_KINDS = ("position", "velocity", "torque", "power")
+LIMIT_KINDS = ("position", "velocity", "torque", "power", "clearance")
 INTEGRALS = ("kinetic_energy", "torque")
 
 
@@ -92,6 +93,7 @@ class Problem:
 
     q_init: (n,) [rad] the initial configuration (for boundary `free` and `cyclic`: the one that starts are drawn from).
     times: (N + 1,) [s] the knots of the grid on which a global solution is wanted.
+    qd_init: (n,) [rad/s] the velocity that a motion from q_init comes with; None: at rest, or as the path is entered.
     """
 
     task: Task
@@ -102,10 +104,17 @@ class Problem:
     limits: Limits | None = None
     boundary: Boundary = Boundary.FIXED
     integral_bounds: IntegralBounds = field(default_factory=IntegralBounds)
+    obstacles: Obstacles | None = None
+    qd_init: Array | None = None
 
     @property
     def bounds(self) -> Limits:
         return self.limits if self.limits is not None else Limits.none(self.task.arm.n)
+
+    @property
+    def constrained(self) -> bool:
+        """Whether anything limits the motion besides its path."""
+        return self.bounds.any or self.obstacles is not None
 
 
 @dataclass(frozen=True)

@@ -115,11 +115,13 @@ def text(default: str | None) -> Any:
     return _field(default, _optional(default, check))
 
 
-def numbers(default: Sequence[float] | None, *, length: int | None = None, unit: str = "") -> Any:
-    """A list of finite numbers."""
+def numbers(
+    default: Sequence[float] | None, *, length: int | None = None, above: float | None = None, unit: str = ""
+) -> Any:
+    """A list of finite numbers, each above a bound if one is given."""
 
     def check(value: Any, key: str) -> list[float]:
-        one = _check_number(False, None, None, None, unit)
+        one = _check_number(False, None, None, above, unit)
         if not isinstance(value, list | tuple) or (length is not None and len(value) != length):
             raise _fail(
                 key,
@@ -208,6 +210,27 @@ def part(kind: type) -> Any:
 def one_of(kinds: Mapping[str, type], default: str) -> Any:
     """A nested dataclass chosen by the key `kind`."""
     return dataclasses.field(default_factory=kinds[default], metadata={"kinds": kinds})
+
+
+def table_of(kinds: Mapping[str, type], *, listed: bool = False) -> Any:
+    """A free-form table whose entries are dataclasses chosen by their key `kind`; or None, or a list of such under each
+    name, if `listed`.
+    """
+
+    def check(value: Any, key: str) -> dict[str, Any]:
+        if not isinstance(value, Mapping):
+            raise _fail(key, value, "must be a table of names and shapes")
+        made: dict[str, Any] = {}
+        for name, entry in value.items():
+            if not listed:
+                made[str(name)] = _build_kind(kinds, entry, f"{key}.{name}")
+                continue
+            if not isinstance(entry, list | tuple):
+                raise _fail(f"{key}.{name}", entry, "must be a list of shapes")
+            made[str(name)] = [_build_kind(kinds, one, f"{key}.{name}[{i}]") for i, one in enumerate(entry)]
+        return made
+
+    return _field(None, _optional(None, check)) if listed else _field({}, check)
 
 
 def _optional(default: Any, check: Check) -> Check:

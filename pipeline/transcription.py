@@ -27,6 +27,7 @@ from pydrake.solvers import LinearConstraint, MathematicalProgram, QuadraticCons
 
 from pipeline import ipopt
 from pipeline.arrays import Array
+from pipeline.clearance import Clearance, Obstacles
 from pipeline.costs import Costs, integrals, velocities
 from pipeline.differentiable import DifferentiableConstraint, DifferentiableCost
 from pipeline.lagrangian import Lagrangian, trapezoid_weights
@@ -41,12 +42,14 @@ Block = NDArray[np.int_]
 class Transcription:
     """The program of `problem` on the knots `times` (N + 1,), scaled for a solve that starts at `guess` (N + 1, n).
 
-    elastic: kinds of limits (position, velocity, torque, power) that may all be exceeded by the same fraction; that
-    fraction is then what is minimised.
+    elastic: kinds of limits (position, velocity, torque, power, clearance) that may all be exceeded by the same fraction;
+    that fraction is then what is minimised. keep_off: [m] by how much more than the margin obstacles are kept off.
     """
 
-    def __init__(self, problem: Problem, times: Array, guess: Array, *, elastic: Collection[str] = ()) -> None:
-        self.elastic = elastic
+    def __init__(
+        self, problem: Problem, times: Array, guess: Array, *, elastic: Collection[str] = (), keep_off: float = 0.0
+    ) -> None:
+        self.elastic, self.keep_off = elastic, keep_off
         self.problem, self.times, self.q_guess = problem, times, guess
         self.arm, self.objective, self.limits = problem.task.arm, problem.objective, problem.bounds
         self.n, self.intervals = self.arm.n, len(times) - 1
@@ -93,6 +96,8 @@ class Transcription:
         if self.objective.secondary is not None and not elastic:
             for block in _blocks(0, self.intervals + 1):
                 self._add_secondary(block)
+        if problem.obstacles is not None:
+            self._keep_clear(problem.obstacles, first_free)
         if not elastic:
             self._bound_integrals()
 
@@ -308,6 +313,31 @@ class Transcription:
         pattern = [(k * m + i, k * n + j) for k in range(count) for i in range(m) for j in range(n)]
         self._tracking_rows.append(self._add_rows(position, np.zeros(count * m), self.y[knots].ravel(), pattern))
 
+    def _keep_clear(self, obstacles: Obstacles, first: int) -> None:
+        """Every link's distance from every obstacle, by Drake's smooth penalty: at most 1 (clearance.py)."""
+        penalty = Clearance(self.arm, obstacles).rows(self.keep_off)
+        soft = "clearance" in self.elastic
+        for knots in _blocks(first, self.intervals + 1):
+            shape, split = (len(knots), self.n), len(knots) * self.n
+
+            def rows(x: Array, shape: tuple[int, int] = shape, split: int = split) -> tuple[Array, Array]:
+                value, by_q = penalty(x[:split].reshape(shape) / POSITION_SCALE)
+                jacobian = np.zeros((shape[0], x.size))
+                for k, row in enumerate(by_q):
+                    jacobian[k, k * shape[1] : (k + 1) * shape[1]] = row / POSITION_SCALE
+                jacobian[:, split:] = -1.0
+                return value - x[split:].sum(), jacobian
+
+            unknowns = np.concatenate([self.y[knots].ravel(), self.excess if soft else []])
+            constraint = DifferentiableConstraint(rows)
+            free = np.full(len(knots), -np.inf)
+            binding = self.program.AddConstraint(
+                constraint, lb=free, ub=np.full(len(knots), penalty.UPPER), vars=unknowns
+            )
+            pattern = [(k, k * self.n + j) for k in range(len(knots)) for j in range(self.n)]
+            pattern += [(k, split) for k in range(len(knots)) if soft]
+            binding.evaluator().SetGradientSparsityPattern(pattern)
+
     def _add_torque(self, block: Block) -> None:
         """u_i = s_i (M(q_i) qdd_i + n(q_i, qd_i)), with qd_(i-1) from the interval before."""
         count, n = len(block), self.n
@@ -317,7 +347,9 @@ class Transcription:
         step, scale, to_velocity = self.dt[block], self.torque_scale[block], self.to_velocity[block]
         intervals = block if before is None else np.concatenate([[before], block])
         rate = self.to_velocity[intervals]
-        at_speed = not has_before and not self.problem.reference.timing.at_rest
+        given = self.problem.qd_init
+        came_with = (np.zeros(n) if given is None else given)[None]
+        at_speed = not has_before and given is None and not self.problem.reference.timing.at_rest
         diagonal = np.arange(count)
         offset = 1 if has_before else 0
         split_y, split_w = count * n, count * n + own * n
@@ -326,7 +358,7 @@ class Transcription:
             q = x[:split_y].reshape(count, n) / POSITION_SCALE
             all_qd = (rate @ x[split_y:split_w].reshape(own, n, 1))[:, :, 0]
             qd = all_qd[offset:]
-            first = all_qd[:1] if has_before else qd[:1] if at_speed else np.zeros((1, n))
+            first = all_qd[:1] if has_before else qd[:1] if at_speed else came_with
             previous = np.vstack([first, qd[:-1]])
             tau, by_q, by_qd, by_qdd = self.arm.inverse_dynamics_gradient(q, qd, (qd - previous) / step[:, None])
             by_qdd = by_qdd / step[:, None, None]

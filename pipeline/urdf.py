@@ -18,6 +18,7 @@ from scipy.spatial.transform import Rotation
 
 from pipeline.arrays import Array
 from pipeline.errors import RobotError
+from pipeline.geometry import Shape, link_shapes
 
 MOVING = ("revolute", "continuous", "prismatic")
 KEPT_IN_LINK = {"inertial"}
@@ -29,7 +30,8 @@ class Description:
 
     xml: the reduced URDF. joints: names of the n moving joints, base to tip. revolute: (n,) whether a joint turns.
     lower, upper: (n,) position limits [rad or m]. velocity: (n,) [rad/s or m/s]. effort: (n,) [N m or N].
-    A limit that the file does not state is infinite.
+    A limit that the file does not state is infinite. collision: primitive shapes of links. meshes: links that have
+    collision meshes instead, which are not used.
     """
 
     name: str
@@ -43,6 +45,9 @@ class Description:
     upper: Array
     velocity: Array
     effort: Array
+    links: tuple[str, ...] = ()
+    collision: tuple[Shape, ...] = ()
+    meshes: tuple[str, ...] = ()
 
 
 def read(
@@ -108,6 +113,7 @@ def read(
     revolute = np.array([joint.get("type") != "prismatic" for joint in moving])
     lower, upper = (_limits(moving, key, absent, file) for key, absent in (("lower", -np.inf), ("upper", np.inf)))
     velocity, effort = (_limits(moving, key, np.inf, file) for key in ("velocity", "effort"))
+    shapes, meshes = link_shapes(root)
     _strip(root)  # drops the limits too
 
     return Description(
@@ -122,6 +128,9 @@ def read(
         upper=upper,
         velocity=velocity,
         effort=effort,
+        links=tuple(links),
+        collision=tuple(shapes),
+        meshes=tuple(meshes),
     )
 
 

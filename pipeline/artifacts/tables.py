@@ -38,6 +38,8 @@ UNITS = {
     "min_spectral_radius": "kg m²",
     "min_spectral_radius_time": "s",
     "singular_time": "s",
+    "min_clearance": "m",
+    "min_clearance_between": "m",
     "wall_time_s": "s",
 }
 
@@ -102,6 +104,8 @@ def _row(problem: Problem, e: Evaluation) -> dict[str, Any]:
     }
     for name, values in (("velocity", e.qd), ("torque", e.tau), ("power", e.power)):
         row |= {f"peak_{name}_{j + 1}": peak for j, peak in enumerate(np.abs(values).max(axis=0))}
+    if problem.obstacles is not None:
+        row |= {"min_clearance": e.clearance.min(), "min_clearance_between": e.clearance_between}
     for suffix, excess in (("", e.limit_excess), ("_between", e.limit_excess_between)):
         row |= {f"{kind}_limit_excess{suffix}": value for kind, value in excess.items()}
     row |= {

@@ -98,17 +98,15 @@ def solve(
 
 def check(problem: Problem) -> None:
     """Refuse problems that this method does not serve; raises InputError."""
-    supported = "supported are r = 1, an objective of first order, boundary free or fixed, and no limits"
-    bounds = problem.bounds
-    limits = np.concatenate([bounds.lower, bounds.upper, bounds.velocity, bounds.torque, bounds.power])
+    supported = "supported are r = 1, an objective of first order, boundary free or fixed, and no limits or obstacles"
     if problem.task.redundancy != 1:
         raise InputError(f"calculus_of_variations: the redundancy degree is {problem.task.redundancy}; {supported}")
     if problem.objective.torque or not Lagrangian(problem.task, problem.objective).is_quadratic:
         raise InputError(f"calculus_of_variations: the objective holds a torque integral; {supported}")
     if problem.boundary is Boundary.CYCLIC:
         raise InputError(f"calculus_of_variations: the boundary is cyclic; {supported}")
-    if np.isfinite(limits).any():
-        raise InputError(f"calculus_of_variations: the problem has limits; {supported}")
+    if problem.constrained:
+        raise InputError(f"calculus_of_variations: the problem has limits or obstacles; {supported}")
 
 
 def _families(problem: Problem, options: CalculusOfVariationsOptions) -> list[_Family]:

@@ -54,7 +54,7 @@ def solve(
             Status.SOLVED,
             optimum=rank + 1,
             tracking_tolerance=TRACKING,
-            limits_kept=("position", "velocity"),
+            limits_kept=("position", "velocity", "clearance"),
             statistics={"cost": float(costs[index]), **(log if rank == 0 else {})},
         )
         for rank, index in enumerate(kept)

@@ -16,6 +16,7 @@ from scipy.interpolate import CubicSpline
 
 from pipeline.arrays import Array
 from pipeline.candidates import distinct, diverse, population, ranking, starting_points
+from pipeline.clearance import Clearance, Obstacles
 from pipeline.config import GlobalOptions
 from pipeline.costs import objective_values
 from pipeline.feasibility import Relaxed, least_violation
@@ -32,6 +33,8 @@ ROUGH_ITERATIONS = 120  # starts that succeed take 10 to 100
 ROUGH = {"constr_viol_tol": 1e-5, "acceptable_tol": 1e-4, "acceptable_constr_viol_tol": 1e-5}
 ELASTIC_STARTS = 3  # from how many motions the least violation is sought when no motion is feasible
 FEWER = 12  # starts on a finer grid after none succeeded on the coarse one
+BETWEEN = 4  # points per interval where clearances between knots are looked at
+CLEARANCE_ROUNDS = 5
 HOPELESS = 0.1  # relative violation on a coarse grid from which on finer ones are not tried
 
 
@@ -176,8 +179,8 @@ def _optimise_start(context: tuple[Problem, Array, GlobalOptions], guess: Array)
     return replace(optimum, solves=solves + optimum.solves)
 
 
-def _optimise(problem: Problem, times: Array, guess: Array, options: GlobalOptions) -> Optimum:
-    program = Transcription(problem, times, guess)
+def _optimise(problem: Problem, times: Array, guess: Array, options: GlobalOptions, keep_off: float = 0.0) -> Optimum:
+    program = Transcription(problem, times, guess, keep_off=keep_off)
     last = len(times) == len(problem.times)
     q, outcome, iterations = program.solve(
         tolerance=options.tolerance if last else max(options.tolerance, ROUGH_TOLERANCE),
@@ -201,7 +204,27 @@ def _refine(context: tuple[Problem, list[Array], GlobalOptions], start: Optimum)
     for coarse, fine in pairwise(grids):
         optimum = _optimise(problem, fine, CubicSpline(coarse, optimum.q)(fine), options)
         solves += optimum.solves
-    return replace(optimum, solves=solves, continuous=stays_on_path(problem, grids[-1], optimum.q))
+    optimum = replace(optimum, solves=solves)
+    if problem.obstacles is not None and optimum.converged:
+        optimum = _clear_between(problem, problem.obstacles, grids[-1], optimum, options)
+    return replace(optimum, continuous=stays_on_path(problem, grids[-1], optimum.q))
+
+
+def _clear_between(
+    problem: Problem, obstacles: Obstacles, times: Array, optimum: Optimum, options: GlobalOptions
+) -> Optimum:
+    """The optimum that keeps its clearance between the knots too: solved again, a little farther off at the knots."""
+    clearance = Clearance(problem.task.arm, obstacles)
+    fine = np.interp(np.arange(BETWEEN * (len(times) - 1) + 1) / BETWEEN, np.arange(len(times)), times)
+    keep_off, solves = 0.0, list(optimum.solves)
+    for _ in range(CLEARANCE_ROUNDS):
+        lacking = obstacles.margin - float(clearance.smallest(CubicSpline(times, optimum.q)(fine)).min())
+        if lacking <= 0 or not optimum.converged:
+            break
+        keep_off += 1.2 * lacking + 1e-7
+        optimum = _optimise(problem, times, optimum.q, options, keep_off)
+        solves += optimum.solves
+    return replace(optimum, solves=solves)
 
 
 def stays_on_path(problem: Problem, times: Array, q: Array) -> bool:
@@ -242,7 +265,7 @@ def _nothing(problem: Problem, status: Status, message: str, log: dict[str, Any]
 
 
 def _relaxed(problem: Problem, times: Array, motions: Array) -> Relaxed | None:
-    if not problem.bounds.any:
+    if not problem.constrained:
         return None
     return least_violation(problem, times, list(motions[:ELASTIC_STARTS]))
 

@@ -42,13 +42,15 @@ LARGEST = 1e8  # a Newton step may go far astray; Drake must not see what is not
 
 def check(problem: Problem) -> None:
     """Refuse problems that this method does not serve; raises InputError."""
-    supported = "supported are objectives of first order, boundary free or fixed, positions only, and no limits"
+    supported = (
+        "supported are objectives of first order, boundary free or fixed, positions only, and no limits or obstacles"
+    )
     if problem.objective.torque or not Lagrangian(problem.task, problem.objective).is_quadratic:
         raise InputError(f"pontryagin: the objective holds a torque integral; {supported}")
     if problem.boundary is Boundary.CYCLIC:
         raise InputError(f"pontryagin: the boundary is cyclic; {supported}")
-    if problem.bounds.any:
-        raise InputError(f"pontryagin: the problem has limits; {supported}")
+    if problem.constrained:
+        raise InputError(f"pontryagin: the problem has limits or obstacles; {supported}")
     if isinstance(problem.task, PoseTask):
         raise InputError(f"pontryagin: the task prescribes orientations; {supported}")
 
