@@ -2,27 +2,33 @@
 
 Every update interval I the kinetic-energy integral over the next h knots, Delta T apart, is minimised (eq. (4)); the
 pseudoinverse follows the path while the null space follows the predicted joint motion (eq. (2), step 7). An objective of
-other terms of first order (`lagrangian.py`) takes the kinetic energy's place.
+other terms of first order (`lagrangian.py`) takes the kinetic energy's place, and squared torques if asked for; with
+`limits` the window keeps them and its knots are executed (`receding.py`).
 """
 
 from __future__ import annotations
 
 import time as clock
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from scipy.interpolate import BSpline, make_interp_spline
 
+from pipeline import ipopt
 from pipeline.arrays import Array
 from pipeline.config import PmkeOptions
 from pipeline.kinematics import SingularityWatch, project, pseudoinverse
 from pipeline.lagrangian import Lagrangian
-from pipeline.problem import Objective, Problem, Solution, Status, Trajectory
+from pipeline.methods import receding
+from pipeline.problem import Boundary, Objective, Problem, Solution, Status, Trajectory
 from pipeline.shooting import Window
 
 
 def solve(problem: Problem, options: PmkeOptions = PmkeOptions()) -> Solution:
     """Steps 1-10 of Table 1 from q_init. Statistics hold one entry per prediction: time, wall time, iterations, status."""
+    if options.limits:
+        return receding.solve(problem, options)
     task, reference = problem.task, problem.reference
     dt, duration = options.dt, reference.duration
     steps = max(1, round(duration / dt))
@@ -52,7 +58,12 @@ def solve(problem: Problem, options: PmkeOptions = PmkeOptions()) -> Solution:
         toward = (prediction(min(time[i], prediction.t[-1])) - q[i - 1]) / dt
         qd[i] = inverse @ command + toward - inverse @ (jacobian[0] @ toward)
         q[i] = q[i - 1] + dt * qd[i]
-    statistics = {"steps": steps, "horizon": horizon, "predictions": predictor.log}
+    statistics = {
+        "steps": steps,
+        "horizon": horizon,
+        "update_interval": update * dt,
+        "predictions": predictor.log,
+    }
     solution = watch.judge("pmke", Trajectory(time, q), statistics)
     failed = [entry for entry in predictor.log if not entry["converged"]]
     if failed and solution.status is Status.SOLVED:
@@ -72,10 +83,13 @@ class _Predictor:
     def __init__(self, problem: Problem, options: PmkeOptions, horizon: int) -> None:
         self.task, self.reference, self.options, self.horizon = problem.task, problem.reference, options, horizon
         self.step = min(options.prediction_step, problem.reference.duration)
-        lagrangian = Lagrangian(problem.task, problem.objective)
+        self.objective = receding.window_objective(problem, options)
+        self.torque = options.objective == "torque"
+        lagrangian = Lagrangian(problem.task, self.objective)
         if not lagrangian.is_quadratic:
             lagrangian = Lagrangian(problem.task, Objective())
         self.program = Window(lagrangian, horizon, self.step)
+        self.problem = problem
         self.previous: tuple[Array, Array] | None = None
         self.log: list[dict[str, Any]] = []
 
@@ -84,7 +98,9 @@ class _Predictor:
         knots = now + self.step * np.arange(1, self.horizon + 1)
         x_ref = self.reference.position(knots)
         results = [
-            self.program.solve(q, x_ref, guess, tolerance=self.options.tolerance)
+            self._lifted(now, knots, q, qd, guess)
+            if self.torque
+            else self.program.solve(q, x_ref, guess, tolerance=self.options.tolerance)
             for guess in self._guesses(q, x_ref, knots)
         ]
         best = min(results, key=lambda result: (not result[2].converged, result[1]))
@@ -107,17 +123,30 @@ class _Predictor:
         )
         return spline
 
+    def _lifted(
+        self, now: float, knots: Array, q: Array, qd: Array, guess: Array
+    ) -> tuple[Array, float, ipopt.Outcome, int]:
+        """The prediction of least squared torques: accelerations tie it to the velocity qd that the arm has now."""
+        times = np.concatenate([[now], knots])
+        window = replace(
+            self.problem,
+            q_init=q,
+            qd_init=qd,
+            boundary=Boundary.FIXED,
+            objective=self.objective,
+            limits=None,
+            obstacles=None,
+            times=times,
+        )
+        result = receding.solve_window(window, times, np.vstack([q, guess]), self.options.tolerance)
+        return result[0][1:], *result[1:]
+
     def _guesses(self, q: Array, x_ref: Array, knots: Array) -> list[Array]:
         """Start points: an inertia-weighted pseudoinverse roll-out, and the previous prediction moved on to now.
 
         A guess that repeats q can converge to a motion wound by 2 pi; neither of these does.
         """
-        rollout, at = [], q[None]
-        for point in x_ref:
-            inverse_mass = np.linalg.inv(self.task.arm.mass_matrix(at))
-            at, _ = project(self.task, at, point[None], inverse_mass, tolerance=1e-6)
-            rollout.append(at[0])
-        guesses = [np.array(rollout)]
+        guesses = [receding.rollout(self.problem, q, x_ref)]
         if self.previous is not None:
             times, points = self.previous
             # Beyond its end the previous motion is at rest: the last roll-out step carries it on.
