@@ -4,8 +4,8 @@ Every update interval the motion over the next h knots is optimised from the pre
 position, velocity, torque and power limits and clear of the obstacles (`transcription.py`); its first knots are executed
 as they are, so that the executed motion keeps the limits at its knots. A few coarse knots carry the window on to the end
 of the path: a horizon alone runs into dead ends, where the limits leave no way on.
-The first window is planned
-before anything moves, by the global planner. If a later window has no solution, the rest of the last plan is followed; when that is used up too, the method gives up and says
+Before anything moves
+the global planner makes a rough plan of the whole, from which the first window starts. If a later window has no solution, the rest of the last plan is followed; when that is used up too, the method gives up and says
 where.
 """
 
@@ -31,7 +31,8 @@ from pipeline.transcription import Transcription
 
 TRACKING = 1e-6  # [m]
 MOST_ITERATIONS = 120
-FIRST_STARTS = (16, 48)  # of the first window's plan: more if so many find no motion
+PLAN_INTERVALS = 24  # of the plan that is made before anything moves
+FIRST_STARTS = (16, 48)  # of that plan: more if so many find no motion
 
 
 def window_objective(problem: Problem, options: PmkeOptions) -> Objective:
@@ -68,7 +69,9 @@ def solve(problem: Problem, options: PmkeOptions) -> Solution:
     watch = SingularityWatch(options.singular_value, TRACKING)
     objective = window_objective(problem, options)
     q = np.tile(problem.q_init, (count + 1, 1))
-    plan: Callable[[Array], Array] | None = None
+    plan, why_not = _first_plan(problem, objective)
+    if plan is None:
+        return _given_up(why_not, options, times, q[:1], [])
     planned = 0  # the last knot that there is a plan for
     log: list[dict[str, Any]] = []
     for i in range(0, count, every):
@@ -82,14 +85,6 @@ def solve(problem: Problem, options: PmkeOptions) -> Solution:
             boundary=Boundary.FIXED,
             objective=objective,
         )
-        if plan is None:
-            for starts in FIRST_STARTS:
-                first = global_planner.solve(window, GlobalOptions(optimised=starts))[0]
-                if first.found:
-                    break
-            else:
-                return _given_up(first.message, options, times, q[:1], log)
-            plan = _through(ahead, first.trajectory.q)
         found, entry = _update(window, plan, options)
         log.append(entry)
         if found is not None:
@@ -117,6 +112,17 @@ def solve(problem: Problem, options: PmkeOptions) -> Solution:
         limits_kept=LIMIT_KINDS,
         statistics=statistics,
     )
+
+
+def _first_plan(problem: Problem, objective: Objective) -> tuple[Callable[[Array], Array] | None, str]:
+    """The whole motion on a coarse grid, as the global planner finds it; or None, and why there is none."""
+    times = np.linspace(0.0, problem.reference.duration, PLAN_INTERVALS + 1)
+    whole = replace(problem, times=times, objective=objective, boundary=Boundary.FIXED)
+    for starts in FIRST_STARTS:
+        first = global_planner.solve(whole, GlobalOptions(optimised=starts))[0]
+        if first.found:
+            return _through(times, first.trajectory.q), ""
+    return None, first.message
 
 
 def _knots(times: Array, first: int, last: int, tail: int) -> Array:
