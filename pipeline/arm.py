@@ -1,7 +1,7 @@
 """The arm: kinematics, dynamics and their derivatives from Drake's MultibodyPlant, for many configurations per call.
 
 All methods take stacked arguments, one row per knot: q, qd, qdd are (K, n). Up to `BLOCK` copies of the arm live in one
-plant, so that one call into Drake serves that many knots. There is no gravity (a space arm), unless stated.
+plant, so that one call into Drake serves that many knots. There is no gravity (a space arm), unless it is given.
 Sources: PMKE paper Section 2.1, Global paper Section 2; derivatives: see each method.
 """
 
@@ -12,10 +12,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pydrake.math import RigidTransform
+from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import FixedOffsetFrame, JacobianWrtVariable, MultibodyForces
+from pydrake.multibody.tree import (
+    FixedOffsetFrame,
+    JacobianWrtVariable,
+    MultibodyForces,
+    SpatialInertia,
+    UnitInertia,
+)
 
 from pipeline import urdf
 from pipeline.arrays import Array
@@ -25,27 +31,34 @@ BLOCK = 16  # copies per plant: beyond this Drake's cost per knot no longer fall
 _STEP = 1e-5  # central differences of smooth rigid-body functions: truncation and rounding balance near 1e-10
 
 
-def weld_base(plant: Any, description: Description, model: Any) -> None:
-    """Fix the root of a description that was parsed as `model` to the world."""
-    if description.base != "world":  # which Drake takes for its own world
-        plant.WeldFrames(plant.world_frame(), plant.GetFrameByName(description.base, model))
+def assemble(arm: Arm, plant: Any, xml: str, base: str, parser: Any) -> tuple[Any, Any]:
+    """Add one copy of the arm, mounted and with what it carries; returns its model and its end-effector frame."""
+    (model,) = parser.AddModelsFromString(xml, "urdf")
+    mount = RigidTransform(RollPitchYaw(arm.base_rpy), arm.base_position)
+    plant.WeldFrames(plant.world_frame(), plant.GetFrameByName(base, model), mount)
+    tip = plant.GetFrameByName(arm.description.end_effector, model)
+    if np.any(arm.offset) or np.any(arm.offset_rpy):
+        tool = RigidTransform(RollPitchYaw(arm.offset_rpy), arm.offset)
+        tip = plant.AddFrame(FixedOffsetFrame("end_effector_point", tip, tool, model))
+    if arm.payload > 0:
+        point = SpatialInertia(arm.payload, np.zeros(3), UnitInertia(0.0, 0.0, 0.0))
+        load = plant.AddRigidBody("payload", model, point)
+        plant.WeldFrames(tip, load.body_frame())
+    return model, tip
 
 
 class _Stack:
     """`size` copies of one arm in one plant, with a context of its own."""
 
-    def __init__(self, description: Description, size: int, offset: Array) -> None:
+    def __init__(self, arm: Arm, size: int) -> None:
+        description = arm.description
         plant = MultibodyPlant(0.0)
-        plant.mutable_gravity_field().set_gravity_vector(np.zeros(3))
+        plant.mutable_gravity_field().set_gravity_vector(arm.gravity)
         parser = Parser(plant)
         parser.SetAutoRenaming(True)
         self.tips, joints = [], []
         for _ in range(size):
-            (model,) = parser.AddModelsFromString(description.xml, "urdf")
-            weld_base(plant, description, model)
-            tip = plant.GetFrameByName(description.end_effector, model)
-            if np.any(offset):
-                tip = plant.AddFrame(FixedOffsetFrame("end_effector_point", tip, RigidTransform(offset), model))
+            model, tip = assemble(arm, plant, *description.for_drake, parser)
             self.tips.append(tip)
             joints += [plant.GetJointByName(name, model) for name in description.joints]
         plant.Finalize()
@@ -57,14 +70,27 @@ class _Stack:
         self.no_forces = MultibodyForces(plant)
         self.world = plant.world_frame()
         self.zero = np.zeros(size * self.n)
+        self.armature, self.has_gravity = arm.armature, bool(np.any(arm.gravity))
 
     def at(self, q: Array, qd: Array | None = None) -> None:
         self.plant.SetPositions(self.context, q.ravel())
         self.plant.SetVelocities(self.context, self.zero if qd is None else qd.ravel())
 
-    def inverse_dynamics(self, qdd: Array) -> Array:
+    def inertial(self, qdd: Array) -> Array:
+        """M qdd + n, without gravity."""
         tau: Array = self.plant.CalcInverseDynamics(self.context, qdd.ravel(), self.no_forces)
-        return tau.reshape(self.size, self.n)
+        return tau.reshape(self.size, self.n) + self.armature * qdd
+
+    def inverse_dynamics(self, qdd: Array) -> Array:
+        return self.inertial(qdd) - self.gravity() if self.has_gravity else self.inertial(qdd)
+
+    def gravity(self) -> Array:
+        g: Array = self.plant.CalcGravityGeneralizedForces(self.context)
+        return g.reshape(self.size, self.n)
+
+    def mass_matrix(self) -> Array:
+        m = _diagonal_blocks(self.plant.CalcMassMatrix(self.context), self.size)
+        return m + np.diag(self.armature) if np.any(self.armature) else m
 
     def bias(self) -> Array:
         b: Array = self.plant.CalcBiasTerm(self.context)
@@ -72,15 +98,31 @@ class _Stack:
 
 
 class Arm:
-    """A serial arm with n joints, welded to the world, and its end-effector point.
+    """A serial arm with n joints, mounted in the world, and its end-effector frame.
 
-    `description` comes from `pipeline.urdf.read`; `offset` (3,) [m] moves the end-effector point within its link.
+    `description` comes from `pipeline.urdf.read`. offset (3,) [m], offset_rpy (3,) [rad]: the end-effector frame in its
+    link. base_position (3,) [m], base_rpy (3,) [rad]: where the root link stands. gravity (3,) [m/s^2]. payload [kg]: a
+    point mass at the end effector. armature: rotor inertia [kg m^2] (or [kg]), one or (n,), added to the diagonal of M.
     """
 
-    def __init__(self, description: Description, offset: Sequence[float] = (0.0, 0.0, 0.0)) -> None:
+    def __init__(
+        self,
+        description: Description,
+        offset: Sequence[float] = (0.0, 0.0, 0.0),
+        *,
+        offset_rpy: Sequence[float] = (0.0, 0.0, 0.0),
+        base_position: Sequence[float] = (0.0, 0.0, 0.0),
+        base_rpy: Sequence[float] = (0.0, 0.0, 0.0),
+        gravity: Sequence[float] = (0.0, 0.0, 0.0),
+        payload: float = 0.0,
+        armature: float | Sequence[float] = 0.0,
+    ) -> None:
         self.description = description
-        self.offset = np.asarray(offset, dtype=float)
         self.n = len(description.joints)
+        self.offset, self.offset_rpy = np.asarray(offset, dtype=float), np.asarray(offset_rpy, dtype=float)
+        self.base_position, self.base_rpy = np.asarray(base_position, dtype=float), np.asarray(base_rpy, dtype=float)
+        self.gravity, self.payload = np.asarray(gravity, dtype=float), float(payload)
+        self.armature = np.broadcast_to(np.asarray(armature, dtype=float), self.n).copy()
         self._stacks: dict[int, _Stack] = {}
 
     @classmethod
@@ -92,9 +134,10 @@ class Arm:
         base: str | None = None,
         offset: Sequence[float] = (0.0, 0.0, 0.0),
         locked: Mapping[str, float] | None = None,
+        **mounting: Any,
     ) -> Arm:
-        """The chain from `base` (the root if None) to the link `end_effector` of a URDF file; raises RobotError."""
-        return cls(urdf.read(file, end_effector, base, locked), offset)
+        """The chain from `base` (the root if None) to the link `end_effector` of a URDF or SDF file; raises RobotError."""
+        return cls(urdf.read(file, end_effector, base, locked), offset, **mounting)
 
     # --- kinematics ---------------------------------------------------------------------------------------------
 
@@ -201,7 +244,7 @@ class Arm:
 
         def one(stack: _Stack, q: Array) -> Array:
             stack.at(q)
-            return _diagonal_blocks(stack.plant.CalcMassMatrix(stack.context), stack.size)
+            return stack.mass_matrix()
 
         return self._map(one, q)
 
@@ -215,7 +258,7 @@ class Arm:
         return self._map(one, q, qd)
 
     def inverse_dynamics(self, q: Array, qd: Array, qdd: Array) -> Array:
-        """Joint torques tau = M(q) qdd + n(q, qd) (K, n) [N m]."""
+        """Joint torques tau = M(q) qdd + n(q, qd) - g(q) (K, n) [N m]."""
 
         def one(stack: _Stack, q: Array, qd: Array, qdd: Array) -> Array:
             stack.at(q, qd)
@@ -223,9 +266,23 @@ class Arm:
 
         return self._map(one, q, qd, qdd)
 
+    def gravity_torque(self, q: Array) -> Array:
+        """g(q) (K, n) [N m]: the joint torques that gravity exerts."""
+
+        def one(stack: _Stack, q: Array) -> Array:
+            stack.at(q)
+            return stack.gravity()
+
+        return self._map(one, q)
+
     def kinetic_energy(self, q: Array, qd: Array) -> Array:
         """T = 1/2 qd' M(q) qd (K,) [J]."""
-        return 0.5 * np.einsum("kn,kn->k", qd, self.inverse_dynamics(q, np.zeros_like(qd), qd))
+
+        def one(stack: _Stack, q: Array, qd: Array) -> Array:
+            stack.at(q)
+            return 0.5 * np.einsum("kn,kn->k", qd, stack.inertial(qd))
+
+        return self._map(one, q, qd)
 
     # --- derivatives --------------------------------------------------------------------------------------------
 
@@ -238,11 +295,11 @@ class Arm:
         def one(stack: _Stack, q: Array, qd: Array) -> Array:
             step = _STEP / np.maximum(np.sqrt((qd * qd).sum(axis=1, keepdims=True)), 1e-3)
             stack.at(q)
-            momentum = stack.inverse_dynamics(qd)
+            momentum = stack.inertial(qd)
             stack.at(q + step * qd)
-            ahead = stack.inverse_dynamics(qd)
+            ahead = stack.inertial(qd)
             stack.at(q - step * qd)
-            rate = (ahead - stack.inverse_dynamics(qd)) / (2 * step)
+            rate = (ahead - stack.inertial(qd)) / (2 * step)
             stack.at(q, qd)
             return np.hstack([rate - stack.bias(), momentum])
 
@@ -270,7 +327,7 @@ class Arm:
                 by_qd[:, :, j] = (ahead - stack.bias()) / 2
             stack.at(q, qd)
             out[:, :, 0] = stack.inverse_dynamics(qdd)
-            out[:, :, 1 + 2 * stack.n :] = _diagonal_blocks(stack.plant.CalcMassMatrix(stack.context), stack.size)
+            out[:, :, 1 + 2 * stack.n :] = stack.mass_matrix()
             return out
 
         out = self._map(one, q, qd, qdd)
@@ -288,7 +345,7 @@ class Arm:
         for start in range(0, count, BLOCK):
             size = min(BLOCK, count - start)
             if size not in self._stacks:
-                self._stacks[size] = _Stack(self.description, size, self.offset)
+                self._stacks[size] = _Stack(self, size)
             yield one(self._stacks[size], *(argument[start : start + size] for argument in arguments))
 
     def _position_and_jacobian(self, stack: _Stack, q: Array) -> Array:

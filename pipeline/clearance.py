@@ -15,7 +15,7 @@ from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, CoulombFriction
 from pydrake.systems.framework import DiagramBuilder
 from scipy.spatial.transform import Rotation
 
-from pipeline.arm import Arm, weld_base
+from pipeline.arm import Arm, assemble
 from pipeline.arrays import Array
 from pipeline.geometry import Shape
 
@@ -41,10 +41,10 @@ class Clearance:
         description = arm.description
         builder = DiagramBuilder()
         self.plant, scene = AddMultibodyPlantSceneGraph(builder, 0.0)
-        (model,) = Parser(self.plant).AddModelsFromString(description.xml, "urdf")
-        weld_base(self.plant, description, model)
+        xml, root = description.for_drake
+        model, _ = assemble(arm, self.plant, xml, root, Parser(self.plant))
         self.names: dict[Any, str] = {}
-        bodies = [self.plant.GetBodyByName(str(shape.frame), model) for shape in description.collision]
+        bodies = [self.plant.GetBodyByName(self._drake_name(shape.frame), model) for shape in description.collision]
         links = [
             self._register(body, shape, str(shape.frame))
             for body, shape in zip(bodies, description.collision, strict=True)
@@ -59,6 +59,10 @@ class Clearance:
         self.plant_context = self.plant.GetMyMutableContextFromRoot(self.context)
         # Drake leaves out pairs that cannot move against each other: the base and the obstacles.
         self.any = bool(obstacles.shapes) and not all(self.plant.IsAnchored(body) for body in bodies)
+
+    def _drake_name(self, link: str | None) -> str:
+        description = self.arm.description
+        return description.for_drake[1] if link == description.base else str(link)
 
     def _register(self, body: Any, shape: Shape, name: str) -> Any:
         pose = RigidTransform(RotationMatrix(Rotation.from_rotvec(shape.rotation).as_matrix()), shape.position)

@@ -28,6 +28,7 @@ from pipeline.schema import (
     table_of,
     table_of_numbers,
     text,
+    word_or_vector,
 )
 
 METHODS = (
@@ -85,11 +86,16 @@ class RobotConfig:
     base: str | None = text(None)
     end_effector: str = text("tip")
     offset: list[float] = numbers([0.0, 0.0, 0.0], length=3, unit="m")
+    offset_rpy: list[float] = numbers([0.0, 0.0, 0.0], length=3, unit="rad")
+    base_position: list[float] = numbers([0.0, 0.0, 0.0], length=3, unit="m")
+    base_rpy: list[float] = numbers([0.0, 0.0, 0.0], length=3, unit="rad")
+    payload: float = number(0.0, low=0, unit="kg")
+    armature: float | list[float] = per_joint(0.0, low=0, unit="kg m^2")
     task: list[str] = choices(["x", "y"], "x", "y", "z")
     orientation: str = choice("none", "none", "full", "pointing")
     pointing: list[float] = numbers([0.0, 0.0, 1.0], length=3)
     collision: dict[str, list[SphereConfig | BoxConfig | CapsuleConfig]] | None = table_of(SHAPES, listed=True)
-    q_init: list[float] = numbers([0.0, 0.327, -0.754], unit="rad")
+    q_init: list[float] | None = numbers([0.0, 0.327, -0.754], unit="rad", optional=True)
     locked: dict[str, float] | None = mapping(any_number, optional=True)
 
 
@@ -383,6 +389,7 @@ class RunConfig:
         },
         "kinetic_energy",
     )
+    gravity: str | list[float] = word_or_vector("none", "none", "earth", unit="m/s^2")
     limits: LimitsConfig = part(LimitsConfig)
     boundary: BoundaryConfig = part(BoundaryConfig)
     obstacles: ObstaclesConfig = part(ObstaclesConfig)

@@ -9,10 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from pydrake.math import RigidTransform
+from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import FixedOffsetFrame, JacobianWrtVariable, MultibodyForces
+from pydrake.multibody.tree import FixedOffsetFrame, JacobianWrtVariable, MultibodyForces, SpatialInertia
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
@@ -272,22 +272,29 @@ def limit_excess(problem: Problem, q: Array, qd: Array, tau: Array, clearance: f
 
 
 class _Plant:
-    """One arm in a plant of its own."""
+    """One arm in a plant of its own, its rotor inertias in Drake's actuators."""
 
     def __init__(self, arm: Arm) -> None:
-        description = arm.description
-        self.plant = MultibodyPlant(0.0)
-        (model,) = Parser(self.plant).AddModelsFromString(description.xml, "urdf")
-        if description.base != "world":
-            self.plant.WeldFrames(self.plant.world_frame(), self.plant.GetFrameByName(description.base, model))
-        link = self.plant.GetFrameByName(description.end_effector, model)
-        self.end = self.plant.AddFrame(FixedOffsetFrame("evaluated_point", link, RigidTransform(arm.offset), model))
-        self.plant.mutable_gravity_field().set_gravity_vector(np.zeros(3))
-        self.plant.Finalize()
-        self.joints = [self.plant.GetJointByName(name, model) for name in description.joints]
+        xml, root = arm.description.for_drake
+        plant = self.plant = MultibodyPlant(0.0)
+        (model,) = Parser(plant).AddModelsFromString(xml, "urdf")
+        stand = RigidTransform(RotationMatrix(Rotation.from_euler("xyz", arm.base_rpy).as_matrix()), arm.base_position)
+        plant.WeldFrames(plant.world_frame(), plant.GetFrameByName(root, model), stand)
+        link = plant.GetFrameByName(arm.description.end_effector, model)
+        tool = RigidTransform(RotationMatrix(Rotation.from_euler("xyz", arm.offset_rpy).as_matrix()), arm.offset)
+        self.end = plant.AddFrame(FixedOffsetFrame("evaluated_point", link, tool, model))
+        plant.mutable_gravity_field().set_gravity_vector(arm.gravity)
+        self.joints = [plant.GetJointByName(name, model) for name in arm.description.joints]
+        for joint, inertia in zip(self.joints, arm.armature, strict=True):
+            plant.AddJointActuator(joint.name(), joint).set_default_rotor_inertia(inertia)
+        if arm.payload > 0:
+            # A ball so small that it is a point, which Drake's check of inertias also lets pass.
+            ball = plant.AddRigidBody("load", model, SpatialInertia.SolidSphereWithMass(arm.payload, 1e-6))
+            plant.WeldFrames(self.end, ball.body_frame())
+        plant.Finalize()
         self.order = np.array([joint.position_start() for joint in self.joints])
-        self.context = self.plant.CreateDefaultContext()
-        self.forces = MultibodyForces(self.plant)
+        self.context = plant.CreateDefaultContext()
+        self.forces = MultibodyForces(plant)
 
     def _scatter(self, values: Array) -> Array:
         out = np.zeros(len(self.order))
@@ -301,7 +308,9 @@ class _Plant:
         return float(self.plant.CalcKineticEnergy(self.context))
 
     def torque(self, qdd: Array) -> Array:
-        return np.asarray(self.plant.CalcInverseDynamics(self.context, self._scatter(qdd), self.forces))[self.order]
+        # Drake's inverse dynamics leaves gravity to the caller.
+        tau = self.plant.CalcInverseDynamics(self.context, self._scatter(qdd), self.forces)
+        return np.asarray(tau - self.plant.CalcGravityGeneralizedForces(self.context))[self.order]
 
     def mass_matrix(self) -> Array:
         return np.asarray(self.plant.CalcMassMatrix(self.context))[np.ix_(self.order, self.order)]

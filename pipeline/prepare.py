@@ -12,6 +12,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from pipeline import config as schema
+from pipeline import packages, urdf
 from pipeline.arm import Arm
 from pipeline.arrays import Array
 from pipeline.clearance import Clearance, Obstacles
@@ -36,8 +37,10 @@ from pipeline.path import (
 from pipeline.problem import Boundary, Limits, Objective, Problem
 from pipeline.secondary import Secondary
 from pipeline.task import PositionTask, Task, pose_task
+from pipeline.urdf import Description
 
 PROJECT = File(__file__).resolve().parent.parent
+GRAVITY = {"none": (0.0, 0.0, 0.0), "earth": (0.0, 0.0, -9.80665)}  # [m/s^2]
 TIMINGS: dict[str, Callable[[float], Timing]] = {
     "raised_cosine": RaisedCosine,
     "constant_speed": ConstantSpeed,
@@ -48,14 +51,9 @@ TIMINGS: dict[str, Callable[[float], Timing]] = {
 def prepare(config: schema.RunConfig) -> Problem:
     """The problem that a configuration states; raises InputError, one line, if it cannot be posed."""
     robot = config.robot
-    arm = Arm.from_urdf(find(robot.urdf), robot.end_effector, base=robot.base, offset=robot.offset, locked=robot.locked)
-    if robot.collision is not None:
-        arm.description = replace(arm.description, collision=_link_shapes(robot.collision, arm))
+    arm = load(robot, config.gravity)
     task = _task(robot, arm)
-    if len(robot.q_init) != arm.n:
-        names = ", ".join(arm.description.joints)
-        raise RobotError(f"robot.q_init has {len(robot.q_init)} values, the arm has {arm.n} moving joints ({names})")
-    q_init = np.array(robot.q_init)
+    q_init = initial(robot, arm)
     geometry, orientation, q_init = _path(config.path, task, q_init)
     reference = Reference(geometry, TIMINGS[config.timing.law](config.timing.duration), orientation)
     problem = Problem(
@@ -71,6 +69,40 @@ def prepare(config: schema.RunConfig) -> Problem:
     _check(problem)
     _require_reach(problem)
     return problem
+
+
+def load(robot: schema.RobotConfig, gravity: str | list[float] = "none") -> Arm:
+    """The arm of a configuration; raises RobotError or ConfigError, one line."""
+    description = urdf.read(find(robot.urdf), robot.end_effector, robot.base, robot.locked)
+    if robot.collision is not None:
+        shapes = _link_shapes(robot.collision, description)
+        description = replace(description, collision=shapes)
+    if isinstance(robot.armature, list) and len(robot.armature) != len(description.joints):
+        raise ConfigError(
+            f"robot.armature has {len(robot.armature)} values, the arm has {len(description.joints)} moving joints"
+        )
+    return Arm(
+        description,
+        robot.offset,
+        offset_rpy=robot.offset_rpy,
+        base_position=robot.base_position,
+        base_rpy=robot.base_rpy,
+        gravity=GRAVITY[gravity] if isinstance(gravity, str) else gravity,
+        payload=robot.payload,
+        armature=robot.armature,
+    )
+
+
+def initial(robot: schema.RobotConfig, arm: Arm) -> Array:
+    """robot.q_init, or the middle of the joints' ranges; zero where a joint has none."""
+    if robot.q_init is None:
+        low, high = arm.description.lower, arm.description.upper
+        ranged = np.isfinite(high - low)
+        return np.where(ranged, np.where(ranged, low + high, 0.0) / 2, 0.0)
+    if len(robot.q_init) != arm.n:
+        names = ", ".join(arm.description.joints)
+        raise RobotError(f"robot.q_init has {len(robot.q_init)} values, the arm has {arm.n} moving joints ({names})")
+    return np.array(robot.q_init)
 
 
 def _knots(timing: schema.TimingConfig) -> Array:
@@ -137,9 +169,9 @@ def _shape(name: str, shape: Any, frame: str | None = None) -> Shape:
     return Shape(name, "box", tuple(shape.size), center, turn, frame)
 
 
-def _link_shapes(table: dict[str, list[Any]], arm: Arm) -> tuple[Shape, ...]:
+def _link_shapes(table: dict[str, list[Any]], description: Description) -> tuple[Shape, ...]:
     """The shapes that the configuration gives the links, in place of those of the description."""
-    links = arm.description.links
+    links = description.links
     for link in table:
         if link not in links:
             close = difflib.get_close_matches(link, links, n=3, cutoff=0.4) or list(links)[:12]
@@ -194,9 +226,11 @@ def _check(problem: Problem) -> None:
             )
 
 
-def find(urdf: str) -> File:
-    """A robot description by absolute path, or relative to the working directory or else to the project."""
-    given = File(urdf).expanduser()
+def find(name: str) -> File:
+    """A robot description by package:// name, absolute path, or path relative to the working directory or the project."""
+    if name.startswith(packages.PREFIX):
+        return packages.locate(name, "robot.urdf")
+    given = File(name).expanduser()
     if not given.is_absolute() and not given.is_file() and (PROJECT / given).is_file():
         return PROJECT / given
     return given.absolute()  # kept results are found again from any working directory

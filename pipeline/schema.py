@@ -116,9 +116,14 @@ def text(default: str | None) -> Any:
 
 
 def numbers(
-    default: Sequence[float] | None, *, length: int | None = None, above: float | None = None, unit: str = ""
+    default: Sequence[float] | None,
+    *,
+    length: int | None = None,
+    above: float | None = None,
+    unit: str = "",
+    optional: bool = False,
 ) -> Any:
-    """A list of finite numbers, each above a bound if one is given."""
+    """A list of finite numbers, each above a bound if one is given; None is allowed where it is the default or `optional`."""
 
     def check(value: Any, key: str) -> list[float]:
         one = _check_number(False, None, None, above, unit)
@@ -130,19 +135,36 @@ def numbers(
             )
         return [one(entry, f"{key}[{i}]") for i, entry in enumerate(value)]
 
-    return _field(None if default is None else list(default), _optional(default, check))
+    made = None if default is None else list(default)
+    return _field(made, _optional(None if optional else default, check))
 
 
-def per_joint(*, above: float | None = None, unit: str = "") -> Any:
-    """None, one number for all joints, or a list with one number per joint."""
-    one = _check_number(False, None, None, above, unit)
+def word_or_vector(default: str, *allowed: str, unit: str = "") -> Any:
+    """One of the words in `allowed`, or three numbers."""
+
+    def check(value: Any, key: str) -> str | list[float]:
+        if isinstance(value, str) and value in allowed:
+            return value
+        try:
+            return numbers([], length=3, unit=unit).metadata["check"](value, key)
+        except ConfigError:
+            raise _fail(key, value, f"allowed: {', '.join(allowed)}, or three numbers {unit}") from None
+
+    return _field(default, check)
+
+
+def per_joint(
+    default: float | None = None, *, low: float | None = None, above: float | None = None, unit: str = ""
+) -> Any:
+    """One number for all joints, or a list with one number per joint; None is allowed where it is the default."""
+    one = _check_number(False, low, None, above, unit)
 
     def check(value: Any, key: str) -> float | list[float]:
         if isinstance(value, list | tuple):
             return [one(entry, f"{key}[{i}]") for i, entry in enumerate(value)]
         return float(one(value, key))
 
-    return _field(None, _optional(None, check))
+    return _field(default, _optional(default, check))
 
 
 def intervals() -> Any:

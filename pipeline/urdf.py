@@ -1,4 +1,4 @@
-"""Read a URDF, check it, and reduce it to the chain that moves: the form in which `arm.py` hands it to Drake.
+"""Read a URDF or SDF, check it, and reduce it to the chain that moves: the form in which `arm.py` hands it to Drake.
 
 Only the dynamics are kept: pictures, meshes, transmissions and simulator tags are dropped, so that a missing mesh
 does not matter. Every joint off the chain from base to end effector becomes rigid at its given (or zero) position.
@@ -10,6 +10,7 @@ import difflib
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,7 @@ from scipy.spatial.transform import Rotation
 from pipeline.arrays import Array
 from pipeline.errors import RobotError
 from pipeline.geometry import Shape, link_shapes
+from pipeline.sdf import to_urdf
 
 MOVING = ("revolute", "continuous", "prismatic")
 KEPT_IN_LINK = {"inertial"}
@@ -49,6 +51,20 @@ class Description:
     collision: tuple[Shape, ...] = ()
     meshes: tuple[str, ...] = ()
 
+    @cached_property
+    def for_drake(self) -> tuple[str, str]:
+        """The reduced URDF and its root link. Drake takes a link called `world` for its own world: it gets another name."""
+        if self.base != "world":
+            return self.xml, self.base
+        root, other = ET.fromstring(self.xml), "world_"
+        while other in self.links:
+            other += "_"
+        for element in root.iter():
+            for key in ("link", "name"):
+                if element.tag in ("link", "parent", "child") and element.get(key) == "world":
+                    element.set(key, other)
+        return ET.tostring(root, encoding="unicode"), other
+
 
 def read(
     file: str | Path, end_effector: str, base: str | None = None, locked: Mapping[str, float] | None = None
@@ -57,10 +73,13 @@ def read(
     file = Path(file)
     if not file.is_file():
         raise RobotError(f"robot.urdf = {file}: no such file")
-    try:
-        root = ET.fromstring(file.read_bytes())
-    except ET.ParseError as error:
-        raise RobotError(f"robot.urdf = {file}: not well-formed XML ({error})") from None
+    if file.suffix == ".sdf":
+        root = to_urdf(file)
+    else:
+        try:
+            root = ET.fromstring(file.read_bytes())
+        except ET.ParseError as error:
+            raise RobotError(f"robot.urdf = {file}: not well-formed XML ({error})") from None
     if root.tag != "robot":
         raise RobotError(f"robot.urdf = {file}: the root element is <{root.tag}>, expected <robot>")
 

@@ -19,7 +19,7 @@ from pipeline.candidates import distinct, diverse, population, ranking, starting
 from pipeline.clearance import Clearance, Obstacles
 from pipeline.config import GlobalOptions
 from pipeline.costs import objective_values
-from pipeline.feasibility import Relaxed, least_violation
+from pipeline.feasibility import Relaxed, least_violation, violations
 from pipeline.kinematics import wrap
 from pipeline.lagrangian import Lagrangian
 from pipeline.parallel import Workers
@@ -33,6 +33,7 @@ ROUGH_ITERATIONS = 120  # starts that succeed take 10 to 100
 ROUGH = {"constr_viol_tol": 1e-5, "acceptable_tol": 1e-4, "acceptable_constr_viol_tol": 1e-5}
 ELASTIC_STARTS = 3  # from how many motions the least violation is sought when no motion is feasible
 FEWER = 12  # starts on a finer grid after none succeeded on the coarse one
+ROOM = 1e-3  # relative, to a torque limit that may be left out
 BETWEEN = 4  # points per interval where clearances between knots are looked at
 CLEARANCE_ROUNDS = 5
 HOPELESS = 0.1  # relative violation on a coarse grid from which on finer ones are not tried
@@ -163,20 +164,47 @@ def _optimise_start(context: tuple[Problem, Array, GlobalOptions], guess: Array)
     """
     problem, times, options = context
     solves: list[dict[str, Any]] = []
-    bounds = problem.bounds
-    torque_counts = problem.objective.torque > 0 or np.isfinite(bounds.torque).any() or np.isfinite(bounds.power).any()
-    if torque_counts:
-        free = np.full(problem.task.arm.n, np.inf)
+    if problem.objective.torque > 0 or _limits_torque(problem):
         first_order = Lagrangian(problem.task, problem.objective).is_quadratic
         objective = replace(problem.objective, torque=0.0) if first_order else Objective()
-        smooth = replace(problem, objective=objective, limits=replace(bounds, torque=free, power=free))
-        first = _optimise(smooth, times, guess, options)
+        first = _optimise(replace(_without_torque_limits(problem), objective=objective), times, guess, options)
         solves += first.solves
         if not first.converged:
             return replace(first, solves=solves)
         guess = first.q
+        if problem.objective.torque == 0 and _keeps_torque_limits(problem, times, guess):
+            return first
     optimum = _optimise(problem, times, guess, options)
     return replace(optimum, solves=solves + optimum.solves)
+
+
+def _limits_torque(problem: Problem) -> bool:
+    return bool(np.isfinite(problem.bounds.torque).any() or np.isfinite(problem.bounds.power).any())
+
+
+def _without_torque_limits(problem: Problem) -> Problem:
+    free = np.full(problem.task.arm.n, np.inf)
+    return replace(problem, limits=replace(problem.bounds, torque=free, power=free))
+
+
+def _keeps_torque_limits(problem: Problem, times: Array, q: Array) -> bool:
+    """Whether torque and power limits are kept with some room: an optimum without them is then one with them."""
+    worst = [v.relative for v in violations(problem, times, q) if v.kind in ("torque", "power")]
+    return all(relative < -ROOM for relative in worst)
+
+
+def _optimise_lazily(
+    problem: Problem, times: Array, guess: Array, options: GlobalOptions, keep_off: float = 0.0
+) -> Optimum:
+    """As `_optimise`; but where torque limits alone bring torques in and the guess keeps them, it is tried without."""
+    torque_counts = problem.objective.torque > 0 or np.isfinite(problem.integral_bounds.torque)
+    if torque_counts or not _limits_torque(problem) or not _keeps_torque_limits(problem, times, guess):
+        return _optimise(problem, times, guess, options, keep_off)
+    optimum = _optimise(_without_torque_limits(problem), times, guess, options, keep_off)
+    if optimum.converged and _keeps_torque_limits(problem, times, optimum.q):
+        return optimum
+    bound = _optimise(problem, times, guess, options, keep_off)
+    return replace(bound, solves=optimum.solves + bound.solves)
 
 
 def _optimise(problem: Problem, times: Array, guess: Array, options: GlobalOptions, keep_off: float = 0.0) -> Optimum:
@@ -202,7 +230,7 @@ def _refine(context: tuple[Problem, list[Array], GlobalOptions], start: Optimum)
     problem, grids, options = context
     optimum, solves = start, list(start.solves)
     for coarse, fine in pairwise(grids):
-        optimum = _optimise(problem, fine, CubicSpline(coarse, optimum.q)(fine), options)
+        optimum = _optimise_lazily(problem, fine, CubicSpline(coarse, optimum.q)(fine), options)
         solves += optimum.solves
     optimum = replace(optimum, solves=solves)
     if problem.obstacles is not None and optimum.converged:
@@ -222,7 +250,7 @@ def _clear_between(
         if lacking <= 0 or not optimum.converged:
             break
         keep_off += 1.2 * lacking + 1e-7
-        optimum = _optimise(problem, times, optimum.q, options, keep_off)
+        optimum = _optimise_lazily(problem, times, optimum.q, options, keep_off)
         solves += optimum.solves
     return replace(optimum, solves=solves)
 
