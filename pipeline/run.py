@@ -115,7 +115,7 @@ def run_and_write(config: schema.RunConfig, folder: File) -> int:
         name=config.name,
         summary=markdown,
         properties=facts,
-        picture=picture,
+        front=picture,
     )
     timed("recording", begin)
     code = 0 if all(evaluation.confirmed for evaluation in evaluations) else 1

@@ -85,7 +85,7 @@ def _space(labels: Sequence[str], points: Array, planar: bool, hidden: Sequence[
     eye = center + 2.4 * size * direction / np.linalg.norm(direction)  # a sphere of `size` fills the field of view
     return rrb.Spatial3DView(
         origin="/",
-        contents=["/reference", *(f"/{slug(label)}/**" for label in labels)],
+        contents=["/reference", "/obstacles/**", *(f"/{slug(label)}/**" for label in labels)],
         name="Arms (3-D)",
         overrides=_hide(hidden),
         background=BACKGROUND,

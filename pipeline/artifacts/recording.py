@@ -12,7 +12,9 @@ import os
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -22,15 +24,19 @@ from rerun.chunk import RrdReader
 from rerun.urdf import UrdfTree
 from scipy.spatial.transform import Rotation
 
+from pipeline.arm import Arm
 from pipeline.arrays import Array
 from pipeline.artifacts import blueprint, style
 from pipeline.artifacts.blueprint import faded, pixels, rgba, slug
+from pipeline.artifacts.picture import picture
 from pipeline.evaluation import Evaluation
+from pipeline.geometry import Shape
 from pipeline.problem import Problem, Status
 
 POSES = 12  # of the stroboscopic picture
 SOLID = 110  # opacity of the arms, of 255: those behind must shine through
 REFERENCE = (190, 190, 190)
+OBSTACLE = (120, 120, 128, 150)
 SHAPES = ("Boxes3D", "Cylinders3D", "Capsules3D", "Ellipsoids3D")
 
 _log = logging.getLogger(__name__)
@@ -44,25 +50,27 @@ def write(
     name: str,
     summary: str,
     properties: Mapping[str, Any],
-    picture: Path | None = None,
+    front: Path | None = None,
 ) -> None:
     """Write the recording `file` (.rrd) of all `evaluations`, or raise and leave nothing behind.
 
     summary: Markdown, shown beside the plots. properties: facts of the run, stored as the recording's property `run`.
-    picture: a PNG to show first, such as the Pareto front (2-D views have no axes of their own).
+    front: a PNG to show first, such as the Pareto front (2-D views have no axes of their own).
     """
     temporary = file.with_name(f"{file.name}.tmp")
     try:
         with _strict(), rr.RecordingStream("selfmotion") as recording:
-            recording.save(temporary, default_blueprint=_layout(problem, evaluations, picture is not None))
+            recording.save(temporary, default_blueprint=_layout(problem, evaluations, front is not None))
             recording.send_recording_name(name)
             if facts := _facts(properties):
                 recording.send_property("run", facts)
             document = rr.TextDocument(summary, media_type=rr.MediaType.MARKDOWN)
             recording.log("summary", document, static=True)
-            if picture is not None:
-                recording.log("picture", rr.EncodedImage(path=picture), static=True)
+            if front is not None:
+                recording.log("picture", rr.EncodedImage(path=front), static=True)
             _send_reference(recording, problem)
+            if problem.obstacles is not None:
+                send_obstacles(recording, problem.obstacles.shapes)
             for evaluation in evaluations:
                 _send_series(recording, problem, evaluation)
                 _send_motion(recording, problem, evaluation)
@@ -97,12 +105,14 @@ def _strict() -> Iterator[None]:
         rr.set_strict_mode(before)
 
 
-def _layout(problem: Problem, evaluations: Sequence[Evaluation], picture: bool) -> Any:
-    points = [np.zeros((1, 3)), _reference(problem)]  # the arm stands at the origin
+def _layout(problem: Problem, evaluations: Sequence[Evaluation], front: bool) -> Any:
+    points = [problem.task.arm.base_position[None], _reference(problem)]
+    if problem.obstacles is not None:
+        points.append(np.array([shape.position for shape in problem.obstacles.shapes]))
     points += [evaluation.skeleton[_finite(evaluation)].reshape(-1, 3) for evaluation in evaluations]
     labels = [evaluation.label for evaluation in evaluations]
     revolute = problem.task.arm.description.revolute.tolist()
-    return blueprint.build(labels, np.concatenate(points), revolute, _planar(problem), _ranges(evaluations), picture)
+    return blueprint.build(labels, np.concatenate(points), revolute, _planar(problem), _ranges(evaluations), front)
 
 
 def _ranges(evaluations: Sequence[Evaluation]) -> dict[str, tuple[float, float]]:
@@ -244,12 +254,23 @@ def _flat(points: Array) -> Array:
 
 def _send_arm(recording: Any, problem: Problem, evaluation: Evaluation, time: list[Any], q: Array) -> None:
     """The user's own picture of the arm in the colour of the method; without one the stick figure must do."""
-    description, root = problem.task.arm.description, slug(evaluation.label)
+    draw_arm(recording, problem.task.arm, slug(evaluation.label), rgba(evaluation.label, SOLID), time, q)
+
+
+def draw_arm(recording: Any, arm: Arm, root: str, color: tuple[int, ...], time: list[Any], q: Array) -> None:
+    """The arm's picture at q (K, n) on the time line, below the entity `root`."""
+    description = arm.description
     try:
-        tree = UrdfTree.from_file_path(description.file, entity_path_prefix=root, frame_prefix=f"{root}/")
-        chunks = [
-            c for c in tree.stream(include_joint_transforms=False) if "/collision_geometries/" not in c.entity_path
-        ]
+        xml, notes = picture(description)
+        for note in notes:
+            _note(note)
+        if not xml:
+            return
+        with TemporaryDirectory() as folder:
+            file = Path(folder) / "picture.urdf"
+            file.write_text(xml, encoding="utf-8")
+            tree = UrdfTree.from_file_path(file, entity_path_prefix=root, frame_prefix=f"{root}/")
+            chunks = list(tree.stream(include_joint_transforms=False))
         joints = {joint.name: joint for joint in tree.joints()}
         moving = [
             joints[name].compute_transform_columns(column, clamp=False)
@@ -261,16 +282,46 @@ def _send_arm(recording: Any, problem: Problem, evaluation: Evaluation, time: li
     recording.send_chunks(chunks)
     for entity, shape in _shapes(chunks):
         if shape == "Asset3D":
-            recording.log(entity, rr.Asset3D.from_fields(albedo_factor=rgba(evaluation.label, SOLID)), static=True)
+            recording.log(entity, rr.Asset3D.from_fields(albedo_factor=color), static=True)
         else:
-            solid = getattr(rr, shape).from_fields(colors=[rgba(evaluation.label, SOLID)], fill_mode="solid")
+            solid = getattr(rr, shape).from_fields(colors=[color], fill_mode="solid")
             recording.log(entity, solid, static=True)
-    base = rr.Transform3D(parent_frame="tf#/", child_frame=f"{root}/{description.base}")
+    base = rr.Transform3D(
+        translation=arm.base_position,
+        quaternion=Rotation.from_euler("xyz", arm.base_rpy).as_quat(),
+        parent_frame="tf#/",
+        child_frame=f"{root}/{description.base}",
+    )
     recording.log(f"{root}/tf/base", base, static=True)  # without it an arm with frames of its own is not shown
     for joint, transform in _rigid(description.xml, description.joints, root):
         recording.log(_transform(root, joint), transform, static=True)
     for joint, columns in zip(description.joints, moving, strict=True):
         recording.send_columns(_transform(root, joint), time, columns)
+
+
+@cache
+def _note(text: str) -> None:
+    """Said once: a run draws the same arm many times."""
+    _log.warning("note: %s", text)
+
+
+def send_obstacles(recording: Any, shapes: Sequence[Shape]) -> None:
+    """Solids that stand in the world."""
+    for shape in shapes:
+        common: dict[str, Any] = {"colors": [OBSTACLE], "fill_mode": "solid"}
+        place = {"quaternions": [Rotation.from_rotvec(shape.rotation).as_quat()]}
+        if shape.kind == "capsule":
+            radius, length = shape.size
+            # Rerun's capsules start at their origin: moved back by half their length.
+            axis = Rotation.from_rotvec(shape.rotation).apply([0.0, 0.0, length / 2])
+            solid: Any = rr.Capsules3D(
+                lengths=[length], radii=[radius], translations=[shape.position - axis], **place, **common
+            )
+        elif shape.kind == "sphere":
+            solid = rr.Ellipsoids3D(radii=[shape.size[0]], centers=[shape.position], **common)
+        else:
+            solid = rr.Boxes3D(sizes=[shape.size], centers=[shape.position], **place, **common)
+        recording.log(f"obstacles/{slug(shape.name)}", solid, static=True)
 
 
 def _transform(root: str, joint: str) -> str:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -201,9 +200,9 @@ def _optimise_lazily(
     if torque_counts or not _limits_torque(problem) or not _keeps_torque_limits(problem, times, guess):
         return _optimise(problem, times, guess, options, keep_off)
     optimum = _optimise(_without_torque_limits(problem), times, guess, options, keep_off)
-    if optimum.converged and _keeps_torque_limits(problem, times, optimum.q):
+    if not optimum.converged or _keeps_torque_limits(problem, times, optimum.q):
         return optimum
-    bound = _optimise(problem, times, guess, options, keep_off)
+    bound = _optimise(problem, times, optimum.q, options, keep_off)
     return replace(bound, solves=optimum.solves + bound.solves)
 
 
@@ -229,9 +228,16 @@ def _optimise(problem: Problem, times: Array, guess: Array, options: GlobalOptio
 def _refine(context: tuple[Problem, list[Array], GlobalOptions], start: Optimum) -> Optimum:
     problem, grids, options = context
     optimum, solves = start, list(start.solves)
-    for coarse, fine in pairwise(grids):
-        optimum = _optimise_lazily(problem, fine, CubicSpline(coarse, optimum.q)(fine), options)
-        solves += optimum.solves
+    on, failures = grids[0], 0
+    for fine in grids[1:]:
+        finer = _optimise_lazily(problem, fine, CubicSpline(on, optimum.q)(fine), options)
+        solves += finer.solves
+        if finer.converged or fine is grids[-1]:
+            optimum, on, failures = finer, fine, 0
+            continue
+        failures += 1  # one grid may be unlucky; the next starts from the last that was not
+        if failures > 1:
+            return replace(finer, solves=solves)
     optimum = replace(optimum, solves=solves)
     if problem.obstacles is not None and optimum.converged:
         optimum = _clear_between(problem, problem.obstacles, grids[-1], optimum, options)
