@@ -360,6 +360,26 @@ class ParetoOptions:
 
 
 @dataclass(frozen=True)
+class ExportConfig:
+    """The motion that is written for a controller: `best`, the cheapest confirmed one, `none`, or that of one method."""
+
+    method: str = choice("best", "best", "none", *METHODS)
+    rate: float = number(100.0, above=0, high=10_000, unit="Hz")
+
+
+@dataclass(frozen=True)
+class ClosedLoopConfig:
+    """Drake's Simulator follows the exported motion with a torque-limited inverse-dynamics controller."""
+
+    run: bool = switch(False)
+    bandwidth: float = number(20.0, above=0, unit="rad/s")
+    damping: float = number(1.0, above=0)
+    sampling: float = number(1000.0, above=0, high=100_000, unit="Hz")
+    mass_error: float = number(0.0, above=-1)
+    initial_error: float = number(0.0, unit="rad")
+
+
+@dataclass(frozen=True)
 class PublishedConfig:
     """Printed numbers that a run is compared against: data for the tables, never used in solving."""
 
@@ -398,6 +418,8 @@ class RunConfig:
     sweep: SweepConfig = part(SweepConfig)
     pareto: ParetoOptions = part(ParetoOptions)
     candidate_study: CandidateStudyConfig = part(CandidateStudyConfig)
+    export: ExportConfig = part(ExportConfig)
+    closed_loop: ClosedLoopConfig = part(ClosedLoopConfig)
     published: PublishedConfig = part(PublishedConfig)
 
 

@@ -255,9 +255,17 @@ def limit_excess(problem: Problem, q: Array, qd: Array, tau: Array, clearance: f
     """By how much each kind of limit is exceeded, relative to its size (positions: to half the range; clearances: to the
     margin); <= 0 if kept.
     """
-    limits = problem.bounds
     if not problem.constrained or not np.all(np.isfinite(q)):
         return {}
+    found = {kind: float(excess.max()) for kind, excess in _excesses(problem, q, qd, tau).items()}
+    if problem.obstacles is not None:
+        found["clearance"] = 1 - clearance / problem.obstacles.margin
+    return found
+
+
+def _excesses(problem: Problem, q: Array, qd: Array, tau: Array) -> dict[str, Array]:
+    """The same (K, n) for every sample and joint, of the kinds that are limited."""
+    limits = problem.bounds
     half = np.where(np.isfinite(limits.upper - limits.lower), (limits.upper - limits.lower) / 2, 1.0)
     kinds = {
         "position": (np.maximum(q - limits.upper, limits.lower - q) / half, limits.upper),
@@ -265,10 +273,37 @@ def limit_excess(problem: Problem, q: Array, qd: Array, tau: Array, clearance: f
         "torque": (np.abs(tau) / limits.torque - 1, limits.torque),
         "power": (np.abs(tau * qd) / limits.power - 1, limits.power),
     }
-    found = {kind: float(excess.max()) for kind, (excess, bound) in kinds.items() if np.isfinite(bound).any()}
-    if problem.obstacles is not None:
-        found["clearance"] = 1 - clearance / problem.obstacles.margin
-    return found
+    return {kind: excess for kind, (excess, bound) in kinds.items() if np.isfinite(bound).any()}
+
+
+@dataclass(frozen=True)
+class Audit:
+    """What samples of a motion keep: errors [m, rad], excess of limits and, by kind, the sample and joint of the worst."""
+
+    tracking_error: float
+    orientation_error: float
+    limit_excess: dict[str, float]
+    worst: dict[str, tuple[int, int]]
+
+
+def audit(problem: Problem, time: Array, q: Array, qd: Array, qdd: Array) -> Audit:
+    """Judge samples (K, n) that come with their own velocities and accelerations, at times (K,)."""
+    plant, targets = _Plant(problem.task.arm), problem.reference.position(time)
+    error, turned, tau = np.empty(len(time)), np.empty(len(time)), np.empty_like(q)
+    for i in range(len(time)):
+        plant.at(q[i], qd[i])
+        error[i], turned[i] = plant.task_error(problem.task, targets[i])
+        tau[i] = plant.torque(qdd[i])
+    scene = None if problem.obstacles is None else Clearance(problem.task.arm, problem.obstacles)
+    clearance = _clearance(scene, q)
+    worst = {
+        kind: tuple(int(place) for place in np.unravel_index(int(np.argmax(excess)), excess.shape))
+        for kind, excess in _excesses(problem, q, qd, tau).items()
+    }
+    if scene is not None:
+        worst["clearance"] = (int(np.argmin(clearance)), 0)
+    excess = limit_excess(problem, q, qd, tau, float(clearance.min()))
+    return Audit(float(error.max()), float(turned.max()), excess, worst)  # type: ignore[arg-type]
 
 
 class _Plant:

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from pipeline import candidate_study, certificate, convergence, front, validation
-from pipeline.config import RunConfig
+from pipeline import candidate_study, certificate, closed_loop, convergence, front, resample, validation
+from pipeline.config import ExportConfig, RunConfig
 from pipeline.costs import objective_values
 from pipeline.evaluation import Evaluation
-from pipeline.problem import Problem
+from pipeline.problem import Problem, Status
 
 FEW = 4  # motions between the extremes of a front that the figures show
 
@@ -25,6 +25,8 @@ class Extras:
     study: candidate_study.Study | None = None
     front: pd.DataFrame | None = None
     convergence: pd.DataFrame | None = None
+    exported: resample.Resampled | None = None
+    closed_loop: closed_loop.ClosedLoop | None = None
 
     def shown(self, evaluations: Sequence[Evaluation]) -> list[Evaluation]:
         """The motions that figures show one by one: all of them, but of a front its extremes, its knee and a few between."""
@@ -36,17 +38,34 @@ class Extras:
         return [e for e in evaluations if e.method != "pareto" or e.solution.optimum in chosen]
 
 
+NOTHING = Extras()
+
+
 def compute(problem: Problem, config: RunConfig, evaluations: Sequence[Evaluation]) -> Extras:
     """The extras that the methods of this run make possible."""
     pair = certificate.comparable([evaluation.solution for evaluation in evaluations])
     methods = {evaluation.method for evaluation in evaluations}
+    chosen = _chosen(config.export, evaluations)
     return Extras(
         certificate=None if pair is None else certificate.certify(problem, *pair),
         validation=validation.table(problem, evaluations) if methods >= {"global", "calculus_of_variations"} else None,
         front=front.table(evaluations),
         convergence=convergence.table(problem, [evaluation.solution for evaluation in evaluations]),
         study=_study(problem, config, evaluations) if config.candidate_study.run else None,
+        exported=None if chosen is None else resample.resample(problem, chosen, config.export.rate),
+        closed_loop=(
+            closed_loop.simulate(problem, chosen, config.closed_loop)
+            if chosen is not None and config.closed_loop.run
+            else None
+        ),
     )
+
+
+def _chosen(export: ExportConfig, evaluations: Sequence[Evaluation]) -> Evaluation | None:
+    """The motion to export; None if there is no confirmed one, or none is asked for."""
+    good = [e for e in evaluations if e.status is Status.SOLVED and export.method in ("best", e.method)]
+    # Of a method with several optima, and of all methods, the cheapest by the problem's own objective.
+    return min(good, key=lambda e: e.objective, default=None) if export.method != "none" else None
 
 
 def _study(problem: Problem, config: RunConfig, evaluations: Sequence[Evaluation]) -> candidate_study.Study | None:

@@ -64,7 +64,7 @@ def solve(
 
 def run_and_write(config: schema.RunConfig, folder: File) -> int:
     """One whole run into `folder`; returns the exit code."""
-    from pipeline.artifacts import figures, front_figure, recording, study_figure, tables
+    from pipeline.artifacts import closed_loop_figure, export, figures, front_figure, recording, study_figure, tables
     from pipeline.console import Console
 
     stages: dict[str, float] = {}
@@ -94,12 +94,17 @@ def run_and_write(config: schema.RunConfig, folder: File) -> int:
     timed("extras", begin)
 
     begin = time.perf_counter()
-    summary = tables.summary(problem, evaluations, wall_times, config.published)
+    summary = tables.summary(problem, evaluations, wall_times, config.published, extra)
     markdown = tables.markdown(config, problem, evaluations, summary, extra)
     tables.write(folder, evaluations, summary, markdown, extra)
+    if extra.exported is not None:
+        arm = problem.task.arm.description
+        export.write(folder, extra.exported, arm.joints, arm.base)
     timed("tables", begin)
     begin = time.perf_counter()
     figures.write(folder / "figures", problem, extra.shown(evaluations), name=config.name)
+    if extra.closed_loop is not None:
+        closed_loop_figure.write(folder / "figures", extra.closed_loop, problem, name=config.name)
     if extra.study is not None:
         study_figure.write(folder / "figures", extra.study, name=config.name)
     picture = None
@@ -120,7 +125,7 @@ def run_and_write(config: schema.RunConfig, folder: File) -> int:
     timed("recording", begin)
     code = 0 if all(evaluation.confirmed for evaluation in evaluations) else 1
     facts |= {"inputs": inputs, "exit_code": code}
-    tables.write_run(folder, config, facts, results, evaluations, stages)
+    tables.write_run(folder, config, facts, results, evaluations, stages, extra)
     shutil.rmtree(folder / UNFINISHED, ignore_errors=True)
     console.report(summary, folder)
     return code

@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from pipeline import certificate
+from pipeline import certificate, resample
 from pipeline.config import PublishedConfig, RunConfig
 from pipeline.evaluation import Evaluation
-from pipeline.extras import Extras
+from pipeline.extras import NOTHING, Extras
 from pipeline.files import write_beside
 from pipeline.front import hypervolume
 from pipeline.problem import Problem, Solution
@@ -39,18 +39,26 @@ UNITS = {
     "min_spectral_radius_time": "s",
     "singular_time": "s",
     "min_clearance": "m",
+    "export_tracking_error": "m",
+    "closed_loop_joint_error": "rad",
+    "closed_loop_tracking_error": "m",
     "min_clearance_between": "m",
     "wall_time_s": "s",
 }
 
 
 def summary(
-    problem: Problem, evaluations: Sequence[Evaluation], wall_times: Mapping[str, float], published: PublishedConfig
+    problem: Problem,
+    evaluations: Sequence[Evaluation],
+    wall_times: Mapping[str, float],
+    published: PublishedConfig,
+    extras: Extras = NOTHING,
 ) -> pd.DataFrame:
     """One row per motion; `published_*` and `difference_*` (relative) columns where a document prints the number."""
     rows = []
     for evaluation in evaluations:
-        row = _row(problem, evaluation) | {"wall_time_s": wall_times[evaluation.method]}
+        row = _row(problem, evaluation) | _sent(evaluation, extras)
+        row["wall_time_s"] = wall_times[evaluation.method]
         if evaluation.solution.optimum == 1:
             for column, printed in published.values.get(evaluation.method, {}).items():
                 row[f"published_{column}"] = printed
@@ -75,6 +83,22 @@ def _first_order(problem: Problem, e: Evaluation) -> dict[str, Any]:
         "transversality_start": e.solution.statistics.get("transversality_start", np.nan),
         "transversality_end": e.solution.statistics.get("transversality_end", np.nan),
     }
+
+
+def _sent(e: Evaluation, extras: Extras) -> dict[str, Any]:
+    """What became of the motion that is exported and simulated; others have none of these columns' values."""
+    row: dict[str, Any] = {}
+    motion, loop = extras.exported, extras.closed_loop
+    if motion is not None and (motion.method, motion.optimum) == (e.method, e.solution.optimum):
+        row["export_tracking_error"] = motion.tracking_error
+        row |= {f"export_{kind}_limit_excess": excess for kind, excess in motion.limit_excess.items()}
+    if loop is not None and (loop.method, loop.optimum) == (e.method, e.solution.optimum):
+        row |= {
+            "closed_loop_joint_error": np.abs(loop.joint_error).max(),
+            "closed_loop_tracking_error": loop.end_effector_error.max(),
+            "closed_loop_saturation": loop.saturation,
+        }
+    return row
 
 
 def _updates(e: Evaluation) -> dict[str, Any]:
@@ -184,6 +208,10 @@ def markdown(
     if extras.convergence is not None:
         lines += ["", "## Planner on finer grids, against the extremal of the maximum principle", ""]
         lines += markdown_table(_cells(extras.convergence))
+    if extras.exported is not None:
+        lines += ["", f"Exported: {resample.sentence(extras.exported)}."]
+    if extras.closed_loop is not None:
+        lines += ["", f"Closed loop: {extras.closed_loop.sentence}."]
     if extras.study is not None:
         study = extras.study
         lines += [
@@ -269,6 +297,7 @@ def write_run(
     results: Sequence[tuple[list[Solution], float]],
     evaluations: Sequence[Evaluation],
     stages: Mapping[str, float],
+    extras: Extras = NOTHING,
 ) -> None:
     """run.json: versions, seed, statistics of every solve, timings per stage, machine, the configuration."""
     solved = [
@@ -281,12 +310,37 @@ def write_run(
         "stages_s": dict(stages),
         "methods_s": {solutions[0].method: seconds for solutions, seconds in results},
         "solutions": solved,
+        **_sent_facts(extras),
         "config": asdict(config),
     }
     write_beside(
         folder / "run.json",
         lambda file: file.write_text(json.dumps(content, indent=1, default=_plain), encoding="utf-8"),
     )
+
+
+def _sent_facts(extras: Extras) -> dict[str, Any]:
+    facts: dict[str, Any] = {}
+    if (motion := extras.exported) is not None:
+        facts["export"] = {
+            "method": motion.method,
+            "optimum": motion.optimum,
+            "samples": len(motion.time),
+            "tracking_error": motion.tracking_error,
+            "limit_excess": motion.limit_excess,
+            "keeps_limits": motion.keeps_limits,
+        }
+    if (loop := extras.closed_loop) is not None:
+        facts["closed_loop"] = {
+            "method": loop.method,
+            "optimum": loop.optimum,
+            "joint_error": float(np.abs(loop.joint_error).max()),
+            "tracking_error": float(loop.end_effector_error.max()),
+            "saturation": loop.saturation,
+            "peak_torque_over_limit": np.abs(loop.tau).max(axis=0) / loop.effort,
+            "diverged": loop.diverged,
+        }
+    return facts
 
 
 def _plain(value: Any) -> Any:
