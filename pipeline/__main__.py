@@ -9,6 +9,7 @@ import os
 import re
 import sys
 import traceback
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import hydra
@@ -55,7 +56,13 @@ def job(values: DictConfig) -> int:
 
 
 def main() -> int:
-    """Parse, run, and turn every foreseeable error into one line."""
+    """Runs and sweeps."""
+    return run_job(job)
+
+
+def run_job(job: Callable[[DictConfig], int], overrides: Sequence[str] = ()) -> int:
+    """Parse the command line, do the job, and turn every foreseeable error into one line; `overrides` come before it."""
+    sys.argv[1:1] = overrides
     # Hydra then hands its errors to us instead of printing pages and leaving with 1.
     os.environ["HYDRA_FULL_ERROR"] = "1"
     try:

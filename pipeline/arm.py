@@ -187,6 +187,12 @@ class Arm:
 
         return self._map(one, q)
 
+    def first_joint(self) -> Array:
+        """Where the first joint stands (3,) [m] in the world."""
+        stack = _Stack(self, 1)
+        frame = stack.plant.GetJointByName(self.description.joints[0]).frame_on_parent()
+        return np.asarray(frame.CalcPoseInWorld(stack.context).translation())
+
     def pose(self, q: Array) -> tuple[Array, Array]:
         """Positions (K, 3) [m] and rotation matrices (K, 3, 3) of the end effector in the world."""
 

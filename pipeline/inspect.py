@@ -23,7 +23,13 @@ from pipeline.packages import resolve
 from pipeline.prepare import initial, load
 from pipeline.urdf import link_masses
 
-TASKS = {"position in a plane": 2, "position": 3, "position and pointing": 5, "pose": 6}
+# Rows of the spatial Jacobian (angular, linear) that each kind of task prescribes.
+TASKS = {
+    "position in the x-y plane": [3, 4],
+    "position": [3, 4, 5],
+    "position and pointing": [0, 1, 3, 4, 5],
+    "pose": [0, 1, 2, 3, 4, 5],
+}
 SECONDS = 2.0  # of each joint's sweep
 SAMPLES = 40
 
@@ -36,6 +42,7 @@ class Facts:
     q_init: Array
     masses: dict[str, float]
     reach: float
+    tasks: dict[str, tuple[int, int]]  # of each kind: rank of its Jacobian, and m
     notes: list[str]
 
 
@@ -59,10 +66,23 @@ def inspect(robot: schema.RobotConfig, gravity: str | list[float] = "none") -> F
         notes.append(f"a payload of {arm.payload:g} kg at the end effector")
     if np.any(arm.armature):
         notes.append(f"rotor inertia {', '.join(f'{a:g}' for a in arm.armature)} kg m^2 added to the joints")
-    missing = [mesh for mesh in description.pictures if (file := resolve(mesh, description.file.parent)) is None or not file.is_file()]
+    missing = [
+        mesh
+        for mesh in description.pictures
+        if (file := resolve(mesh, description.file.parent)) is None or not file.is_file()
+    ]
     if missing:
         notes.append(f"{len(missing)} mesh files not found, such as {missing[0]}: the arm is drawn without them")
-    return Facts(arm, q_init, link_masses(description), reach(arm), notes)
+    return Facts(arm, q_init, link_masses(description), reach(arm), ranks(arm), notes)
+
+
+def ranks(arm: Arm) -> dict[str, tuple[int, int]]:
+    """For each kind of task, the rank of its Jacobian at a generic configuration, and m."""
+    q = np.random.default_rng(1).uniform(-1.0, 1.0, size=(8, arm.n))
+    frame = arm.pose(q)[1]
+    both = arm.spatial_jacobian(q)
+    own = np.concatenate([frame.swapaxes(1, 2) @ both[:, :3], both[:, 3:]], axis=1)
+    return {task: (int(np.linalg.matrix_rank(own[:, rows], tol=1e-8).max()), len(rows)) for task, rows in TASKS.items()}
 
 
 def reach(arm: Arm) -> float:
@@ -88,10 +108,12 @@ def show(facts: Facts, console: Console) -> None:
     """Print the facts."""
     arm = facts.arm
     description = arm.description
-    console.print(f"[bold]{description.name}[/bold]  {description.file.name}, {description.base} to {description.end_effector}")
-    table = Table(box=None, padding=(0, 2))
-    for column in ("joint", "type", "lower", "upper", "velocity", "effort", "q_init", "moves [kg]"):
-        table.add_column(column, justify="left" if column in ("joint", "type") else "right")
+    console.print(
+        f"[bold]{description.name}[/bold]  {description.file.name}, {description.base} to {description.end_effector}"
+    )
+    table = Table(box=None, padding=(0, 1))
+    for column in ("joint", "type", "lower", "upper", "velocity", "effort", "q_init", "kg moved"):
+        table.add_column(column, justify="left" if column in ("joint", "type") else "right", no_wrap=True)
     for j, name in enumerate(description.joints):
         values = (description.lower[j], description.upper[j], description.velocity[j], description.effort[j])
         cells = [f"{value:.4g}" if np.isfinite(value) else "none" for value in values]
@@ -102,9 +124,12 @@ def show(facts: Facts, console: Console) -> None:
     tip = arm.position(facts.q_init[None])[0]
     console.print(f"moving mass {sum(facts.masses.values()):.4g} kg, reach {facts.reach:.4g} m from the first joint")
     console.print(f"end effector at q_init: {', '.join(f'{v:.4g}' for v in tip)} m")
-    for task, m in TASKS.items():
+    for task, (rank, m) in facts.tasks.items():
         r = arm.n - m
-        console.print(f"  {task} (m = {m}): " + (f"r = {r}" if r > 0 else "no redundancy"))
+        said = f"r = {r}" if r > 0 else "no redundancy"
+        console.print(
+            f"  {task} (m = {m}): " + (said if rank == m else f"the arm moves in {rank} of {m} directions only")
+        )
     for note in facts.notes:
         console.print(f"note: {note}")
 
@@ -144,6 +169,7 @@ def job(values: DictConfig) -> int:
 
 
 if __name__ == "__main__":
-    from pipeline.__main__ import run
+    from pipeline.__main__ import run_job
 
-    sys.exit(run(job, ["hydra.run.dir=outputs/inspect/${robot.name}"]))
+    # Nothing is planned: the check of the path and the methods before a run is left out.
+    sys.exit(run_job(job, ["hydra.run.dir=outputs/inspect/${robot.name}", "~hydra.callbacks.session"]))

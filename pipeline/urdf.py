@@ -33,7 +33,7 @@ class Description:
     xml: the reduced URDF. joints: names of the n moving joints, base to tip. revolute: (n,) whether a joint turns.
     lower, upper: (n,) position limits [rad or m]. velocity: (n,) [rad/s or m/s]. effort: (n,) [N m or N].
     A limit that the file does not state is infinite. collision: primitive shapes of links. meshes: links that have
-    collision meshes instead, which are not used.
+    collision meshes instead, which are not used. pictures: file names of visual meshes.
     """
 
     name: str
@@ -50,6 +50,7 @@ class Description:
     links: tuple[str, ...] = ()
     collision: tuple[Shape, ...] = ()
     meshes: tuple[str, ...] = ()
+    pictures: tuple[str, ...] = ()
 
     @cached_property
     def for_drake(self) -> tuple[str, str]:
@@ -133,6 +134,7 @@ def read(
     lower, upper = (_limits(moving, key, absent, file) for key, absent in (("lower", -np.inf), ("upper", np.inf)))
     velocity, effort = (_limits(moving, key, np.inf, file) for key in ("velocity", "effort"))
     shapes, meshes = link_shapes(root)
+    pictures = dict.fromkeys(mesh.get("filename", "") for mesh in root.iterfind("link/visual/geometry/mesh"))
     _strip(root)  # drops the limits too
 
     return Description(
@@ -150,6 +152,7 @@ def read(
         links=tuple(links),
         collision=tuple(shapes),
         meshes=tuple(meshes),
+        pictures=tuple(pictures),
     )
 
 
@@ -266,6 +269,27 @@ def _check_inertia(
         raise RobotError(
             f"robot.urdf = {file}: no mass on link{'s' if len(massless) > 1 else ''} {', '.join(massless)}; every moving link needs an <inertial> with a mass"
         )
+
+
+def link_masses(description: Description) -> dict[str, float]:
+    """The mass [kg] that each moving joint carries rigidly, up to the next moving joints."""
+    root = ET.fromstring(description.xml)
+    links, joints = _by_name(root, "link", description.file), root.findall("joint")
+    masses = {}
+    for joint in joints:
+        if joint.get("name") not in description.joints:
+            continue
+        total, queue = 0.0, [_end(joint, "child")]
+        while queue:
+            link = queue.pop()
+            total += _mass(links[link], description.file)
+            queue += [
+                _end(other, "child")
+                for other in joints
+                if _end(other, "parent") == link and other.get("name") not in description.joints
+            ]
+        masses[joint.get("name", "")] = total
+    return masses
 
 
 def _mass(link: ET.Element, file: Path) -> float:

@@ -44,7 +44,9 @@ def draw(loop: ClosedLoop, problem: Problem, name: str) -> Figure:
     panels[1].set_ylabel("End-effector error [m]")
     panels[2].set_ylabel("Wanted torque / limit" if limited else "Torque [N m]")
     panels[2].set_xlabel("Time [s]; shaded: a joint is at its effort limit")
-    panels[0].legend(ncols=4, fontsize=8, frameon=False)
+    figure.legend(
+        *panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=7, fontsize=8, frameon=False
+    )
     figure.suptitle(f"{name}: closed loop, {style.name(loop.method)}", fontweight="bold")
     return figure
 

@@ -59,7 +59,7 @@ def write(
     """
     temporary = file.with_name(f"{file.name}.tmp")
     try:
-        with _strict(), rr.RecordingStream("selfmotion") as recording:
+        with strict(), rr.RecordingStream("selfmotion") as recording:
             recording.save(temporary, default_blueprint=_layout(problem, evaluations, front is not None))
             recording.send_recording_name(name)
             if facts := _facts(properties):
@@ -95,7 +95,7 @@ def read_series(file: Path, entity: str) -> tuple[Array, Array]:
 
 
 @contextmanager
-def _strict() -> Iterator[None]:
+def strict() -> Iterator[None]:
     """Errors in what is logged raise; by default Rerun drops the data with a warning."""
     before = rr.strict_mode()
     rr.set_strict_mode(True)
@@ -166,7 +166,7 @@ def _facts(properties: Mapping[str, Any]) -> list[Any]:
     ]
 
 
-def _columns(time: Array) -> list[Any]:
+def columns(time: Array) -> list[Any]:
     """The time line: rounded, because Rerun cuts seconds off to whole nanoseconds."""
     return [rr.TimeColumn("time", duration=np.rint(time * 1e9).astype("timedelta64[ns]"))]
 
@@ -181,7 +181,7 @@ def _send_reference(recording: Any, problem: Problem) -> None:
 
 
 def _send_series(recording: Any, problem: Problem, evaluation: Evaluation) -> None:
-    time, label, root = _columns(evaluation.time), evaluation.label, slug(evaluation.label)
+    time, label, root = columns(evaluation.time), evaluation.label, slug(evaluation.label)
     joints = list(problem.task.arm.description.joints)
     colors = [style.joint_color(j) for j in range(len(joints))]
     vectors = {"joint_position": evaluation.q, "joint_velocity": evaluation.qd, "joint_torque": evaluation.tau}
@@ -212,7 +212,7 @@ def _send_motion(recording: Any, problem: Problem, evaluation: Evaluation) -> No
     rows = _finite(evaluation)
     if not rows.any():
         return
-    root, label, time = slug(evaluation.label), evaluation.label, _columns(evaluation.time[rows])
+    root, label, time = slug(evaluation.label), evaluation.label, columns(evaluation.time[rows])
     skeleton = evaluation.skeleton[rows]
     _send_arm(recording, problem, evaluation, time, evaluation.q[rows])
     _send_stick(recording, root, label, time, skeleton, (rr.LineStrips3D, rr.Points3D), {})
