@@ -1,7 +1,7 @@
 """The picture of an arm for a viewer: its URDF with meshes that are there, by absolute names, and not too many bytes.
 
 A mesh that is missing, or whose package is not known, is left out and noted; where a link's collision shapes can stand in,
-they do. Big pictures (over LARGE bytes of meshes) give way to the collision shapes too: a recording holds one per motion.
+they do. Big pictures (over LARGE bytes of meshes) give way to simpler ones: a recording holds one per motion.
 """
 
 from __future__ import annotations
@@ -23,6 +23,8 @@ def picture(description: Description) -> tuple[str, list[str]]:
     root = ET.fromstring(description.file.read_bytes())
     missing: list[str] = []
     large = _resolve(root, "visual", description.file.parent, missing) > LARGE
+    if large:
+        large = _simplify(root) > LARGE
     _resolve(root, "collision", description.file.parent, [])
     for link in root.findall("link"):
         solids = [e for e in link.findall("collision") if e.find("geometry") is not None]
@@ -40,6 +42,19 @@ def picture(description: Description) -> tuple[str, list[str]]:
         f"{count} of {description.file.name} not found, drawn without them ({missing[0]}{', ...' * (len(missing) > 1)})"
     )
     return ET.tostring(root, encoding="unicode"), [note]
+
+
+def _simplify(root: ET.Element) -> int:
+    """Take meshes/collision/<name>.stl for meshes/visual/<name>.*, where a package has both. Bytes in all."""
+    size = 0
+    for mesh in root.iterfind("link/visual/geometry/mesh"):
+        file = Path(mesh.get("filename", ""))
+        simple = file.parent.parent / "collision" / f"{file.stem}.stl"
+        if file.parent.name == "visual" and simple.is_file():
+            mesh.set("filename", str(simple))
+            file = simple
+        size += file.stat().st_size
+    return size
 
 
 def _resolve(root: ET.Element, tag: str, folder: Path, missing: list[str]) -> int:

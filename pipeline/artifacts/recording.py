@@ -36,7 +36,7 @@ from pipeline.problem import Problem, Status
 POSES = 12  # of the stroboscopic picture
 SOLID = 110  # opacity of the arms, of 255: those behind must shine through
 REFERENCE = (190, 190, 190)
-OBSTACLE = (120, 120, 128, 150)
+OBSTACLE = (200, 70, 60, 255)
 SHAPES = ("Boxes3D", "Cylinders3D", "Capsules3D", "Ellipsoids3D")
 
 _log = logging.getLogger(__name__)
