@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import casadi as ca
 import numpy as np
 import pytest
+from hydra import compose, initialize_config_dir
 from hypothesis import settings
 
 from pipeline import config, urdf
@@ -17,8 +20,9 @@ from pipeline.arm import Arm
 from pipeline.arrays import Array
 from pipeline.kinematics import project
 from pipeline.path import Line, RaisedCosine, Reference, circle, direction_vector
-from pipeline.prepare import prepare
+from pipeline.prepare import load, prepare
 from pipeline.problem import Problem
+from pipeline.session import checked
 from pipeline.task import PositionTask
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -142,3 +146,27 @@ def backward_differences(problem: Problem, times: Array, motions: Array) -> Arra
     velocity = np.diff(motions, axis=1) / dt[:, None]
     energy = problem.task.arm.kinetic_energy(motions[:, 1:].reshape(-1, 3), velocity.reshape(-1, 3))
     return energy.reshape(len(motions), -1) @ dt
+
+
+def composed(*overrides: str) -> config.RunConfig:
+    """The checked configuration of a command line."""
+    with initialize_config_dir(str(ROOT / "conf"), version_base="1.3"):
+        return checked(compose("config", overrides=list(overrides)))
+
+
+ROBOTS = ("planar3r", "planar4r", "panda", "xarm7")
+
+
+@cache
+def robot(name: str, **mounting: Any) -> Arm:
+    """The arm of `robot=<name>`, with gravity and rotor inertia where it is asked for."""
+    arm = load(composed(f"robot={name}").robot)
+    for key, value in mounting.items():
+        setattr(arm, key, np.asarray(value, dtype=float))
+    return arm
+
+
+def within_limits(arm: Arm, count: int, rng: np.random.Generator) -> Array:
+    """Random configurations (count, n) inside the joint limits."""
+    low = np.maximum(arm.description.lower, -np.pi)
+    return rng.uniform(low, np.minimum(arm.description.upper, np.pi), size=(count, arm.n))
