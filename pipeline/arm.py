@@ -28,7 +28,7 @@ from pipeline.arrays import Array
 from pipeline.urdf import Description
 
 BLOCK = 16  # copies per plant: beyond this Drake's cost per knot no longer falls
-_STEP = 1e-5  # central differences of smooth rigid-body functions: truncation and rounding balance near 1e-10
+STEP = 1e-5  # central differences of smooth rigid-body functions: truncation and rounding balance near 1e-10
 
 
 def assemble(arm: Arm, plant: Any, xml: str, base: str, parser: Any) -> tuple[Any, Any]:
@@ -47,7 +47,7 @@ def assemble(arm: Arm, plant: Any, xml: str, base: str, parser: Any) -> tuple[An
     return model, tip
 
 
-class _Stack:
+class Stack:
     """`size` copies of one arm in one plant, with a context of its own."""
 
     def __init__(self, arm: Arm, size: int) -> None:
@@ -123,7 +123,7 @@ class Arm:
         self.base_position, self.base_rpy = np.asarray(base_position, dtype=float), np.asarray(base_rpy, dtype=float)
         self.gravity, self.payload = np.asarray(gravity, dtype=float), float(payload)
         self.armature = np.broadcast_to(np.asarray(armature, dtype=float), self.n).copy()
-        self._stacks: dict[int, _Stack] = {}
+        self._stacks: dict[int, Stack] = {}
 
     @classmethod
     def from_urdf(
@@ -139,12 +139,37 @@ class Arm:
         """The chain from `base` (the root if None) to the link `end_effector` of a URDF or SDF file; raises RobotError."""
         return cls(urdf.read(file, end_effector, base, locked), offset, **mounting)
 
+    # --- the base: it stands still; see floating.py for one that moves -------------------------------------------
+
+    floats = False
+
+    @property
+    def base_coordinates(self) -> int:
+        """How many of the n coordinates, the first ones, are the base's."""
+        return self.description.base_coordinates
+
+    def motion_map(self, q: Array) -> Array:
+        """B (K, n, joints): all velocities by the joints'."""
+        return np.broadcast_to(np.eye(self.n), (len(q), self.n, self.n))
+
+    def follow(self, q: Array, qd: Array) -> Array:
+        """qd (K, n) with the velocities that the base has under the joints' velocities in it."""
+        return qd
+
+    def lift(self, q: Array, inverse_weight: Array) -> Array:
+        """What (K, joints, joints) inverse weights of the joints' velocities are to all n."""
+        return inverse_weight
+
+    def inverse_inertia(self, q: Array) -> Array:
+        """M^-1 (K, n, n), as a weight of the joints' velocities."""
+        return np.linalg.inv(self.mass_matrix(q))
+
     # --- kinematics ---------------------------------------------------------------------------------------------
 
     def position(self, q: Array) -> Array:
         """End-effector positions (K, 3) [m] in the world."""
 
-        def one(stack: _Stack, q: Array) -> Array:
+        def one(stack: Stack, q: Array) -> Array:
             stack.at(q)
             return np.array([tip.CalcPoseInWorld(stack.context).translation() for tip in stack.tips])
 
@@ -153,7 +178,7 @@ class Arm:
     def jacobian(self, q: Array) -> Array:
         """Translational Jacobians (K, 3, n) of the end effector [m/rad]."""
 
-        def one(stack: _Stack, q: Array) -> Array:
+        def one(stack: Stack, q: Array) -> Array:
             stack.at(q)
             return self._jacobians(stack)
 
@@ -167,7 +192,7 @@ class Arm:
     def jacobian_rate_term(self, q: Array, qd: Array) -> Array:
         """The acceleration Jd qd (K, 3) [m/s^2] of the end effector at qdd = 0."""
 
-        def one(stack: _Stack, q: Array, qd: Array) -> Array:
+        def one(stack: Stack, q: Array, qd: Array) -> Array:
             stack.at(q, qd)
             bias = stack.plant.CalcBiasTranslationalAcceleration
             rows = [
@@ -181,7 +206,7 @@ class Arm:
     def spatial_jacobian(self, q: Array) -> Array:
         """Angular and translational Jacobians (K, 6, n) of the end effector in the world [rad/rad, m/rad], in that order."""
 
-        def one(stack: _Stack, q: Array) -> Array:
+        def one(stack: Stack, q: Array) -> Array:
             stack.at(q)
             return self._jacobians(stack, spatial=True)
 
@@ -189,14 +214,14 @@ class Arm:
 
     def first_joint(self) -> Array:
         """Where the first joint stands (3,) [m] in the world."""
-        stack = _Stack(self, 1)
+        stack = Stack(self, 1)
         frame = stack.plant.GetJointByName(self.description.joints[0]).frame_on_parent()
         return np.asarray(frame.CalcPoseInWorld(stack.context).translation())
 
     def pose(self, q: Array) -> tuple[Array, Array]:
         """Positions (K, 3) [m] and rotation matrices (K, 3, 3) of the end effector in the world."""
 
-        def one(stack: _Stack, q: Array) -> Array:
+        def one(stack: Stack, q: Array) -> Array:
             stack.at(q)
             return np.array([tip.CalcPoseInWorld(stack.context).GetAsMatrix34() for tip in stack.tips])
 
@@ -206,7 +231,7 @@ class Arm:
     def pose_and_jacobian(self, q: Array) -> tuple[Array, Array, Array]:
         """Positions (K, 3), rotation matrices (K, 3, 3) and spatial Jacobians (K, 6, n), as in the methods above."""
 
-        def one(stack: _Stack, q: Array) -> Array:
+        def one(stack: Stack, q: Array) -> Array:
             stack.at(q)
             pose = np.array([tip.CalcPoseInWorld(stack.context).GetAsMatrix34() for tip in stack.tips])
             jacobian = self._jacobians(stack, spatial=True)
@@ -219,7 +244,7 @@ class Arm:
     def spatial_rate_term(self, q: Array, qd: Array) -> Array:
         """Angular and linear acceleration (K, 6) [rad/s^2, m/s^2] of the end effector at qdd = 0."""
 
-        def one(stack: _Stack, q: Array, qd: Array) -> Array:
+        def one(stack: Stack, q: Array, qd: Array) -> Array:
             stack.at(q, qd)
             bias = stack.plant.CalcBiasSpatialAcceleration
             rows = [
@@ -248,7 +273,7 @@ class Arm:
     def mass_matrix(self, q: Array) -> Array:
         """M(q) (K, n, n) [kg m^2]."""
 
-        def one(stack: _Stack, q: Array) -> Array:
+        def one(stack: Stack, q: Array) -> Array:
             stack.at(q)
             return stack.mass_matrix()
 
@@ -257,7 +282,7 @@ class Arm:
     def bias(self, q: Array, qd: Array) -> Array:
         """Coriolis and centrifugal torques n(q, qd) (K, n) [N m], quadratic in qd."""
 
-        def one(stack: _Stack, q: Array, qd: Array) -> Array:
+        def one(stack: Stack, q: Array, qd: Array) -> Array:
             stack.at(q, qd)
             return stack.bias()
 
@@ -266,7 +291,7 @@ class Arm:
     def inverse_dynamics(self, q: Array, qd: Array, qdd: Array) -> Array:
         """Joint torques tau = M(q) qdd + n(q, qd) - g(q) (K, n) [N m]."""
 
-        def one(stack: _Stack, q: Array, qd: Array, qdd: Array) -> Array:
+        def one(stack: Stack, q: Array, qd: Array, qdd: Array) -> Array:
             stack.at(q, qd)
             return stack.inverse_dynamics(qdd)
 
@@ -275,7 +300,7 @@ class Arm:
     def gravity_torque(self, q: Array) -> Array:
         """g(q) (K, n) [N m]: the joint torques that gravity exerts."""
 
-        def one(stack: _Stack, q: Array) -> Array:
+        def one(stack: Stack, q: Array) -> Array:
             stack.at(q)
             return stack.gravity()
 
@@ -284,7 +309,7 @@ class Arm:
     def kinetic_energy(self, q: Array, qd: Array) -> Array:
         """T = 1/2 qd' M(q) qd (K,) [J]."""
 
-        def one(stack: _Stack, q: Array, qd: Array) -> Array:
+        def one(stack: Stack, q: Array, qd: Array) -> Array:
             stack.at(q)
             return 0.5 * np.einsum("kn,kn->k", qd, stack.inertial(qd))
 
@@ -298,8 +323,8 @@ class Arm:
         dT/dq = Mdot qd - n(q, qd), with Mdot qd the central difference of M(q) qd along qd: three calls for any n.
         """
 
-        def one(stack: _Stack, q: Array, qd: Array) -> Array:
-            step = _STEP / np.maximum(np.sqrt((qd * qd).sum(axis=1, keepdims=True)), 1e-3)
+        def one(stack: Stack, q: Array, qd: Array) -> Array:
+            step = STEP / np.maximum(np.sqrt((qd * qd).sum(axis=1, keepdims=True)), 1e-3)
             stack.at(q)
             momentum = stack.inertial(qd)
             stack.at(q + step * qd)
@@ -319,14 +344,14 @@ class Arm:
         By qd exactly, by polarisation of the bias (it is quadratic in qd); by q with central differences.
         """
 
-        def one(stack: _Stack, q: Array, qd: Array, qdd: Array) -> Array:
+        def one(stack: Stack, q: Array, qd: Array, qdd: Array) -> Array:
             out = np.empty((stack.size, stack.n, 1 + 3 * stack.n))
             by_q, by_qd = out[:, :, 1 : 1 + stack.n], out[:, :, 1 + stack.n : 1 + 2 * stack.n]
             for j, unit in enumerate(np.eye(stack.n)):
-                stack.at(q + _STEP * unit, qd)
+                stack.at(q + STEP * unit, qd)
                 ahead = stack.inverse_dynamics(qdd)
-                stack.at(q - _STEP * unit, qd)
-                by_q[:, :, j] = (ahead - stack.inverse_dynamics(qdd)) / (2 * _STEP)
+                stack.at(q - STEP * unit, qd)
+                by_q[:, :, j] = (ahead - stack.inverse_dynamics(qdd)) / (2 * STEP)
                 stack.at(q, qd + unit)
                 ahead = stack.bias()
                 stack.at(q, qd - unit)
@@ -351,10 +376,10 @@ class Arm:
         for start in range(0, count, BLOCK):
             size = min(BLOCK, count - start)
             if size not in self._stacks:
-                self._stacks[size] = _Stack(self, size)
+                self._stacks[size] = Stack(self, size)
             yield one(self._stacks[size], *(argument[start : start + size] for argument in arguments))
 
-    def _position_and_jacobian(self, stack: _Stack, q: Array) -> Array:
+    def _position_and_jacobian(self, stack: Stack, q: Array) -> Array:
         stack.at(q)
         out = np.empty((stack.size, 3, 1 + self.n))
         out[:, :, 0] = [tip.CalcPoseInWorld(stack.context).translation() for tip in stack.tips]
@@ -362,7 +387,7 @@ class Arm:
         return out
 
     @staticmethod
-    def _jacobians(stack: _Stack, spatial: bool = False) -> Array:
+    def _jacobians(stack: Stack, spatial: bool = False) -> Array:
         n, zero, plant = stack.n, np.zeros(3), stack.plant
         jacobian = plant.CalcJacobianSpatialVelocity if spatial else plant.CalcJacobianTranslationalVelocity
         return np.array(

@@ -6,11 +6,15 @@ Global paper Sections 3.1.2 and 3.1.3: qd = W^-1 J'(J W^-1 J')^-1 xd with random
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.arm import Arm
 from pipeline.arrays import Array
 from pipeline.costs import objective_values
+from pipeline.floating import FloatingArm
 from pipeline.kinematics import project, wrap
 from pipeline.problem import Boundary, Problem
 from pipeline.self_motion import random_configurations
@@ -34,21 +38,24 @@ def population(problem: Problem, times: Array, starts: Array, count: int, rng: n
     x_ref = problem.reference.position(times)
     which = np.arange(count) % len(starts)
     turn = np.arange(count) // len(starts)
-    constant = random_inverse_weights(rng, count, arm.n)
-    constant[turn == 1] = np.eye(arm.n)
+    joints = arm.n - arm.base_coordinates
+    constant = random_inverse_weights(rng, count, joints)
+    constant[turn == 1] = np.eye(joints)
     motions: Array = np.empty((count, len(times), arm.n))
     motions[:, 0] = starts[which]
     alive = np.ones(count, dtype=bool)
     by_inertia = np.flatnonzero(turn == 0)
     for i in range(1, len(times)):
-        constant[by_inertia] = np.linalg.inv(arm.mass_matrix(motions[by_inertia, i - 1]))
         rows = np.flatnonzero(alive)
         if not rows.size:
             break
+        before = motions[rows, i - 1]
+        weight = arm.lift(before, constant[rows])
+        weighted = np.isin(rows, by_inertia)
+        weight[weighted] = arm.inverse_inertia(before[weighted])
         target = np.tile(x_ref[i], (len(rows), 1))
-        motions[rows, i], error = project(
-            problem.task, motions[rows, i - 1], target, constant[rows], tolerance=1e-9, max_iterations=12
-        )
+        drifted = before + (times[i] - times[i - 1]) * arm.follow(before, np.zeros_like(before))
+        motions[rows, i], error = project(problem.task, drifted, target, weight, tolerance=1e-9, max_iterations=12)
         alive[rows] = error < 1e-6
     motions = motions[alive]
     if problem.boundary is Boundary.CYCLIC and len(motions):
@@ -58,17 +65,31 @@ def population(problem: Problem, times: Array, starts: Array, count: int, rng: n
 
 def _close(problem: Problem, times: Array, motions: Array) -> Array:
     """Spread the gap between end and start of each motion over its knots, and put the knots back on the path."""
-    revolute = problem.task.arm.description.revolute
-    gap = wrap(motions[:, -1] - motions[:, 0], revolute)
+    arm = problem.task.arm
+    gap = wrap(motions[:, -1] - motions[:, 0], arm.description.revolute)
+    gap[:, : arm.base_coordinates] = 0.0
     ramp = np.linspace(0.0, 1.0, len(times))[:, None]
     # A motion that comes back wound by a full turn is not closed by this; it stays as it is and its gap decides.
     moved = motions - ramp * gap[:, None, :]
+    if arm.base_coordinates:
+        return _refloat(arm, times, moved)
     count, knots, n = moved.shape
     target = np.tile(problem.reference.position(times), (count, 1))
     closed, error = project(problem.task, moved.reshape(-1, n), target, tolerance=1e-9)
     closed = closed.reshape(moved.shape)
     fine = (error.reshape(count, knots).max(axis=1) < 1e-6) & (np.abs(closed[:, -1] - closed[:, 0]).max(axis=1) < 1e-6)
     return closed[fine]
+
+
+def _refloat(arm: Arm, times: Array, motions: Array) -> Array:
+    """Motions (K, N + 1, n) with the same joints, and the base where they take it; the path is for the solver to find."""
+    out = motions.copy()
+    for i in range(1, len(times)):
+        step = motions[:, i] - motions[:, i - 1]
+        middle = out[:, i - 1].copy()
+        middle[:, arm.base_coordinates :] = (motions[:, i] + motions[:, i - 1])[:, arm.base_coordinates :] / 2
+        out[:, i] = out[:, i - 1] + arm.follow(middle, step / (times[i] - times[i - 1])) * (times[i] - times[i - 1])
+    return out
 
 
 def ranking(problem: Problem, times: Array, motions: Array, limit_weight: float) -> Array:
@@ -88,7 +109,13 @@ def starting_points(problem: Problem, count: int, rng: np.random.Generator, draw
     """The initial configurations (C, n) a boundary allows: q_init alone, or those spread by random self-motion."""
     if problem.boundary is Boundary.FIXED:
         return problem.q_init[None]
-    return random_configurations(problem.task, problem.q_init, count, rng, draw)
+    arm, q_init = problem.task.arm, problem.q_init
+    if not isinstance(arm, FloatingArm):
+        return random_configurations(problem.task, q_init, count, rng, draw)
+    # Before the motion begins the base stands where it stands.
+    nb = arm.base_coordinates
+    found = random_configurations(replace(problem.task, arm=arm.on_fixed_base), q_init[nb:], count, rng, draw)
+    return np.hstack([np.tile(q_init[:nb], (len(found), 1)), found])
 
 
 def path_distance(a: Array, b: Array, revolute: NDArray[np.bool_]) -> float:

@@ -44,7 +44,9 @@ class Clearance:
         xml, root = description.for_drake
         model, _ = assemble(arm, self.plant, xml, root, Parser(self.plant))
         self.names: dict[Any, str] = {}
-        bodies = [self.plant.GetBodyByName(self._drake_name(shape.frame), model) for shape in description.collision]
+        bodies = [
+            self.plant.GetBodyByName(description.drake_name(str(shape.frame)), model) for shape in description.collision
+        ]
         links = [
             self._register(body, shape, str(shape.frame))
             for body, shape in zip(bodies, description.collision, strict=True)
@@ -59,10 +61,6 @@ class Clearance:
         self.plant_context = self.plant.GetMyMutableContextFromRoot(self.context)
         # Drake leaves out pairs that cannot move against each other: the base and the obstacles.
         self.any = bool(obstacles.shapes) and not all(self.plant.IsAnchored(body) for body in bodies)
-
-    def _drake_name(self, link: str | None) -> str:
-        description = self.arm.description
-        return description.for_drake[1] if link == description.base else str(link)
 
     def _register(self, body: Any, shape: Shape, name: str) -> Any:
         pose = RigidTransform(RotationMatrix(Rotation.from_rotvec(shape.rotation).as_matrix()), shape.position)

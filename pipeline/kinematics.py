@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.arm import Arm
 from pipeline.arrays import Array
 from pipeline.errors import PathError
 from pipeline.problem import Solution, Status, Trajectory
@@ -23,6 +24,18 @@ def weighted_pseudoinverse(jacobian: Array, inverse_weight: Array) -> Array:
     right = inverse_weight @ np.swapaxes(jacobian, -1, -2)
     # The pseudoinverse of the inner matrix lets an exactly singular configuration pass.
     return np.asarray(right @ np.linalg.pinv(jacobian @ right, rcond=1e-12, hermitian=True))
+
+
+def least_velocity(arm: Arm, q: Array, jacobian: Array, *, weighted: bool = False) -> Array:
+    """J+ (K, n, m), or the inertia-weighted inverse, for J (K, m, n) at q (K, n); on a floating base of the generalized
+    Jacobian: B (J B)+ , so that the base follows the joints (`floating.py`).
+    """
+    if weighted:
+        return weighted_pseudoinverse(jacobian, arm.inverse_inertia(q))
+    if not arm.base_coordinates:
+        return pseudoinverse(jacobian)
+    spread = arm.motion_map(q)
+    return np.asarray(spread @ pseudoinverse(jacobian @ spread))
 
 
 def wrap(difference: Array, revolute: NDArray[np.bool_]) -> Array:

@@ -31,7 +31,7 @@ class PositionTask:
     axes: tuple[str, ...] = ("x", "y")
 
     def __post_init__(self) -> None:
-        _require_redundancy(self.arm.n, self.m, f"robot.task = [{', '.join(self.axes)}]")
+        _require_redundancy(self.redundancy, self.m, f"robot.task = [{', '.join(self.axes)}]")
 
     @property
     def m(self) -> int:
@@ -40,8 +40,8 @@ class PositionTask:
 
     @property
     def redundancy(self) -> int:
-        """Redundancy degree r = n - m."""
-        return self.arm.n - self.m
+        """Redundancy degree r: the arm's joints less m."""
+        return self.arm.n - self.arm.base_coordinates - self.m
 
     @property
     def rows(self) -> list[int]:
@@ -101,7 +101,7 @@ class PoseTask:
 
     def __post_init__(self) -> None:
         kind = "full" if self.pointing is None else "pointing"
-        _require_redundancy(self.arm.n, self.m, f"robot.orientation = {kind}")
+        _require_redundancy(self.redundancy, self.m, f"robot.orientation = {kind}")
 
     @property
     def m(self) -> int:
@@ -109,7 +109,7 @@ class PoseTask:
 
     @property
     def redundancy(self) -> int:
-        return self.arm.n - self.m
+        return self.arm.n - self.arm.base_coordinates - self.m
 
     @property
     def rows(self) -> list[int]:
@@ -201,11 +201,11 @@ class PoseTask:
 Task = PositionTask | PoseTask
 
 
-def _require_redundancy(n: int, m: int, key: str) -> None:
-    if n - m <= 0:
+def _require_redundancy(r: int, m: int, key: str) -> None:
+    if r <= 0:
         raise RobotError(
-            f"{key}: {n} joints for {m} task coordinates leave no redundancy "
-            f"(r = {n - m}); prescribe fewer coordinates or use an arm with more joints"
+            f"{key}: {r + m} joints for {m} task coordinates leave no redundancy "
+            f"(r = {r}); prescribe fewer coordinates or use an arm with more joints"
         )
 
 

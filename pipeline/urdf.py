@@ -34,6 +34,8 @@ class Description:
     lower, upper: (n,) position limits [rad or m]. velocity: (n,) [rad/s or m/s]. effort: (n,) [N m or N].
     A limit that the file does not state is infinite. collision: primitive shapes of links. meshes: links that have
     collision meshes instead, which are not used. pictures: file names of visual meshes.
+    base_coordinates: how many of the joints, the first ones, are not the arm's but move its base (`floating.py`), and
+    root: the link of the xml that they start from.
     """
 
     name: str
@@ -51,20 +53,33 @@ class Description:
     collision: tuple[Shape, ...] = ()
     meshes: tuple[str, ...] = ()
     pictures: tuple[str, ...] = ()
+    base_coordinates: int = 0
+    root: str = ""
+
+    @property
+    def actuated(self) -> tuple[str, ...]:
+        """The names of the arm's own joints."""
+        return self.joints[self.base_coordinates :]
 
     @cached_property
     def for_drake(self) -> tuple[str, str]:
-        """The reduced URDF and its root link. Drake takes a link called `world` for its own world: it gets another name."""
-        if self.base != "world":
-            return self.xml, self.base
-        root, other = ET.fromstring(self.xml), "world_"
-        while other in self.links:
-            other += "_"
-        for element in root.iter():
+        """The reduced URDF and its root link."""
+        root = self.root or self.base
+        if "world" not in self.links:
+            return self.xml, root
+        tree = ET.fromstring(self.xml)
+        for element in tree.iter():
             for key in ("link", "name"):
                 if element.tag in ("link", "parent", "child") and element.get(key) == "world":
-                    element.set(key, other)
-        return ET.tostring(root, encoding="unicode"), other
+                    element.set(key, self.drake_name("world"))
+        return ET.tostring(tree, encoding="unicode"), self.drake_name(root)
+
+    def drake_name(self, link: str) -> str:
+        """What a link is called there: Drake takes one called `world` for its own world, so that gets another name."""
+        other = "world_"
+        while other in self.links:
+            other += "_"
+        return other if link == "world" else link
 
 
 def read(

@@ -35,6 +35,7 @@ FEWER = 12  # starts on a finer grid after none succeeded on the coarse one
 ROOM = 1e-3  # relative, to a torque limit that may be left out
 BETWEEN = 4  # points per interval where clearances between knots are looked at
 CLEARANCE_ROUNDS = 5
+STRAYED = 1.5  # times the guess's cost, from where on a solve has left it
 HOPELESS = 0.1  # relative violation on a coarse grid from which on finer ones are not tried
 
 
@@ -163,6 +164,7 @@ def _optimise_start(context: tuple[Problem, Array, GlobalOptions], guess: Array)
     """
     problem, times, options = context
     solves: list[dict[str, Any]] = []
+    first: Optimum | None = None
     if problem.objective.torque > 0 or _limits_torque(problem):
         first_order = Lagrangian(problem.task, problem.objective).is_quadratic
         objective = replace(problem.objective, torque=0.0) if first_order else Objective()
@@ -174,7 +176,20 @@ def _optimise_start(context: tuple[Problem, Array, GlobalOptions], guess: Array)
         if problem.objective.torque == 0 and _keeps_torque_limits(problem, times, guess):
             return first
     optimum = _optimise(problem, times, guess, options)
+    goes_on = len(times) < len(problem.times)
+    if first is not None and goes_on and _has_strayed(problem, times, guess, optimum):
+        cost = float(objective_values(problem, times, guess[None])[0])
+        optimum = replace(first, cost=cost, solves=optimum.solves)
     return replace(optimum, solves=solves + optimum.solves)
+
+
+def _has_strayed(problem: Problem, times: Array, guess: Array, optimum: Optimum) -> bool:
+    """Whether a solve ended far above a guess that keeps every limit: its first steps led into a motion with jumps, which
+    coarse differences make an optimum of its own. A finer grid then starts from the guess.
+    """
+    if optimum.converged and optimum.cost <= STRAYED * float(objective_values(problem, times, guess[None])[0]):
+        return False
+    return not problem.constrained or all(v.relative <= ROOM for v in violations(problem, times, guess))
 
 
 def _limits_torque(problem: Problem) -> bool:
@@ -230,9 +245,11 @@ def _refine(context: tuple[Problem, list[Array], GlobalOptions], start: Optimum)
     optimum, solves = start, list(start.solves)
     on, failures = grids[0], 0
     for fine in grids[1:]:
-        finer = _optimise_lazily(problem, fine, CubicSpline(on, optimum.q)(fine), options)
+        guess = CubicSpline(on, optimum.q)(fine)
+        finer = _optimise_lazily(problem, fine, guess, options)
         solves += finer.solves
-        if finer.converged or fine is grids[-1]:
+        lost = not finer.converged or _has_strayed(problem, fine, guess, finer)
+        if not lost or fine is grids[-1]:
             optimum, on, failures = finer, fine, 0
             continue
         failures += 1  # one grid may be unlucky; the next starts from the last that was not

@@ -3,6 +3,7 @@
 `lsv`: qd = J+ xd, least squares (PMKE paper eq. (2), qd_0 = 0). The paper prints J+ = (J'J)^-1 J'; the right inverse of a
 wide Jacobian is J+ = J'(J J')^-1, which is used here.
 `inertia_weighted`: qd = M^-1 J'(J M^-1 J')^-1 xd, least qd'M qd at every instant (Whitney 1969; Global paper eq. (10)).
+On a floating base J is the generalized Jacobian and M the reduced inertia (`floating.py`).
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ import numpy as np
 
 from pipeline.arrays import Array
 from pipeline.config import LsvOptions
-from pipeline.kinematics import SingularityWatch, pseudoinverse, weighted_pseudoinverse
+from pipeline.kinematics import SingularityWatch, least_velocity
 from pipeline.problem import Problem, Solution, Trajectory
 
 
@@ -28,12 +29,12 @@ def solve(problem: Problem, options: LsvOptions = LsvOptions(), method: str = "l
     watch = SingularityWatch(options.singular_value, options.max_drift)
 
     def velocity(i: int, q: Array, jacobian: Array, correction: Array) -> Array:
-        watch.see(time[i], jacobian)
-        if method == "inertia_weighted":
-            inverse = weighted_pseudoinverse(jacobian, np.linalg.inv(task.arm.mass_matrix(q[None])[0]))
-        else:
-            inverse = pseudoinverse(jacobian)
-        return np.asarray(inverse @ (task.velocity(q[None], xd_ref[i : i + 1])[0] + correction))
+        watch.see(time[i], jacobian @ task.arm.motion_map(q[None])[0])
+        inverse = least_velocity(task.arm, q[None], jacobian[None], weighted=method == "inertia_weighted")[0]
+        drift = task.arm.follow(q[None], np.zeros_like(q[None]))[0]  # of a base that has momentum
+        return np.asarray(
+            inverse @ (task.velocity(q[None], xd_ref[i : i + 1])[0] + correction - jacobian @ drift) + drift
+        )
 
     q = np.empty((steps + 1, task.arm.n))
     q[0] = problem.q_init

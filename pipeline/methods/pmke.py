@@ -18,7 +18,7 @@ from scipy.interpolate import BSpline, make_interp_spline
 from pipeline import ipopt
 from pipeline.arrays import Array
 from pipeline.config import PmkeOptions
-from pipeline.kinematics import SingularityWatch, project, pseudoinverse
+from pipeline.kinematics import SingularityWatch, least_velocity, project
 from pipeline.lagrangian import Lagrangian
 from pipeline.methods import receding
 from pipeline.problem import Boundary, Objective, Problem, Solution, Status, Trajectory
@@ -29,7 +29,7 @@ def solve(problem: Problem, options: PmkeOptions = PmkeOptions()) -> Solution:
     """Steps 1-10 of Table 1 from q_init. Statistics hold one entry per prediction: time, wall time, iterations, status."""
     if options.limits:
         return receding.solve(problem, options)
-    task, reference = problem.task, problem.reference
+    task, reference, arm = problem.task, problem.reference, problem.task.arm
     dt, duration = options.dt, reference.duration
     steps = max(1, round(duration / dt))
     time = np.linspace(0.0, duration, steps + 1)
@@ -41,21 +41,21 @@ def solve(problem: Problem, options: PmkeOptions = PmkeOptions()) -> Solution:
     predictor = _Predictor(problem, options, horizon)
     watch = SingularityWatch(options.singular_value, options.max_drift)
     x_ref, xd_ref, _ = reference.sample(time)
-    q, qd = np.empty((steps + 1, task.arm.n)), np.zeros((steps + 1, task.arm.n))
+    q, qd = np.empty((steps + 1, arm.n)), np.zeros((steps + 1, arm.n))
     q[0] = problem.q_init
     prediction: BSpline | None = None
     for i in range(1, steps + 1):
         now = time[i - 1]
         # Steps 4-6, repeated every I (8) until only T_p is left (9); the rest follows the last prediction (10).
         if prediction is None or ((i - 1) % update == 0 and now + window <= duration + 1e-9):
-            acceleration = (qd[i - 1] - qd[i - 2]) / dt if i > 1 else np.zeros(task.arm.n)
+            acceleration = (qd[i - 1] - qd[i - 2]) / dt if i > 1 else np.zeros(arm.n)
             prediction = predictor(now, q[i - 1], qd[i - 1], acceleration)
         error, jacobian = task.error_and_jacobian(q[i - 1][None], x_ref[i - 1][None])
-        inverse = pseudoinverse(jacobian[0])
-        watch.see(now, jacobian[0])
+        inverse = least_velocity(arm, q[i - 1][None], jacobian)[0]
+        watch.see(now, jacobian[0] @ arm.motion_map(q[i - 1][None])[0])
         # Step 7, eq. (2): follow the path, and in the null space the prediction.
         command = task.velocity(q[i - 1][None], xd_ref[i][None])[0] - options.gain * error[0]
-        toward = (prediction(min(time[i], prediction.t[-1])) - q[i - 1]) / dt
+        toward = arm.follow(q[i - 1][None], (prediction(min(time[i], prediction.t[-1])) - q[i - 1])[None] / dt)[0]
         qd[i] = inverse @ command + toward - inverse @ (jacobian[0] @ toward)
         q[i] = q[i - 1] + dt * qd[i]
     statistics = {
@@ -84,11 +84,12 @@ class _Predictor:
         self.task, self.reference, self.options, self.horizon = problem.task, problem.reference, options, horizon
         self.step = min(options.prediction_step, problem.reference.duration)
         self.objective = receding.window_objective(problem, options)
-        self.torque = options.objective == "torque"
         lagrangian = Lagrangian(problem.task, self.objective)
+        # The small program knows objectives of first order, and no momentum.
+        self.lifted = options.objective == "torque" or bool(problem.task.arm.base_coordinates)
         if not lagrangian.is_quadratic:
             lagrangian = Lagrangian(problem.task, Objective())
-        self.program = Window(lagrangian, horizon, self.step)
+        self.program = None if self.lifted else Window(lagrangian, horizon, self.step)
         self.problem = problem
         self.previous: tuple[Array, Array] | None = None
         self.log: list[dict[str, Any]] = []
@@ -99,7 +100,7 @@ class _Predictor:
         x_ref = self.reference.position(knots)
         results = [
             self._lifted(now, knots, q, qd, guess)
-            if self.torque
+            if self.program is None
             else self.program.solve(q, x_ref, guess, tolerance=self.options.tolerance)
             for guess in self._guesses(q, x_ref, knots)
         ]
@@ -126,7 +127,9 @@ class _Predictor:
     def _lifted(
         self, now: float, knots: Array, q: Array, qd: Array, guess: Array
     ) -> tuple[Array, float, ipopt.Outcome, int]:
-        """The prediction of least squared torques: accelerations tie it to the velocity qd that the arm has now."""
+        """The prediction by the planner's program: squared torques, whose accelerations tie it to the velocity qd that the
+        arm has now, or a base that conserves momentum.
+        """
         times = np.concatenate([[now], knots])
         window = replace(
             self.problem,
@@ -151,7 +154,8 @@ class _Predictor:
             times, points = self.previous
             # Beyond its end the previous motion is at rest: the last roll-out step carries it on.
             shifted = np.array([np.interp(knots, times, column) for column in points.T]).T
-            moved, left = project(self.task, shifted, x_ref, tolerance=1e-6)
+            weight = receding.path_weight(self.task.arm, shifted)
+            moved, left = project(self.task, shifted, x_ref, weight, tolerance=1e-6)
             if np.all(left < 1e-3):
                 guesses.append(moved)
         return guesses

@@ -20,6 +20,7 @@ import numpy as np
 from scipy.interpolate import make_interp_spline
 
 from pipeline import ipopt
+from pipeline.arm import Arm
 from pipeline.arrays import Array
 from pipeline.config import GlobalOptions, PmkeOptions
 from pipeline.costs import objective_values
@@ -54,10 +55,15 @@ def rollout(problem: Problem, q: Array, targets: Array) -> Array:
     """The inertia-weighted pseudoinverse's motion (K, n) from q (n,) through targets (K, m)."""
     rows, at = [], q[None]
     for target in targets:
-        inverse_mass = np.linalg.inv(problem.task.arm.mass_matrix(at))
-        at, _ = project(problem.task, at, target[None], inverse_mass, tolerance=1e-9)
+        at, _ = project(problem.task, at, target[None], problem.task.arm.inverse_inertia(at), tolerance=1e-9)
         rows.append(at[0])
     return np.array(rows)
+
+
+def path_weight(arm: Arm, q: Array) -> Array | None:
+    """For `project` from q (K, n): least joint displacements, the base following them; None: it stands still."""
+    joints = arm.n - arm.base_coordinates
+    return arm.lift(q, np.tile(np.eye(joints), (len(q), 1, 1))) if arm.base_coordinates else None
 
 
 def solve(problem: Problem, options: PmkeOptions) -> Solution:
@@ -141,7 +147,8 @@ def _update(
     """One window: the motion found from the plan, or else from a roll-out, or None; and what is known of the update."""
     begin = clock.perf_counter()
     targets = window.reference.position(window.times[1:])
-    moved, left = project(window.task, plan(window.times[1:]), targets, tolerance=1e-9)
+    ahead = plan(window.times[1:])
+    moved, left = project(window.task, ahead, targets, path_weight(window.task.arm, ahead), tolerance=1e-9)
     guesses = [moved] if np.all(left < 1e-3) else []
     guesses.append(rollout(window, window.q_init, targets))
     results = []
