@@ -41,7 +41,7 @@ METHODS = (
     "pontryagin",
     "pareto",
 )
-INTEGRALS = ("kinetic_energy", "torque")
+INTEGRALS = ("kinetic_energy", "torque", "base_rotation", "reaction_force", "reaction_torque")
 DEFAULT_METHODS = ("lsv", "pmke", "global")
 
 
@@ -97,6 +97,29 @@ class RobotConfig:
     collision: dict[str, list[SphereConfig | BoxConfig | CapsuleConfig]] | None = table_of(SHAPES, listed=True)
     q_init: list[float] | None = numbers([0.0, 0.327, -0.754], unit="rad", optional=True)
     locked: dict[str, float] | None = mapping(any_number, optional=True)
+
+
+@dataclass(frozen=True)
+class FixedBaseConfig:
+    """`base=fixed`: the root link stands where robot.base_position puts it."""
+
+    kind: str = fixed("fixed")
+
+
+@dataclass(frozen=True)
+class FreeBaseConfig:
+    """`base=free`: the root link is bolted to a spacecraft that floats; its pose at the start is robot.base_position's.
+
+    mass, inertia and com are those of the spacecraft, beside the root link's own; null: the root link is the base.
+    inertia: one moment for all axes, three, or ixx, iyy, izz, ixy, ixz, iyz, about com in the frame of the root link.
+    """
+
+    kind: str = fixed("free")
+    mass: float | None = number(None, above=0, unit="kg")
+    inertia: float | list[float] = per_joint(0.0, unit="kg m^2")
+    com: list[float] = numbers([0.0, 0.0, 0.0], length=3, unit="m")
+    linear_momentum: list[float] = numbers([0.0, 0.0, 0.0], length=3, unit="N s")
+    angular_momentum: list[float] = numbers([0.0, 0.0, 0.0], length=3, unit="N m s")
 
 
 @dataclass(frozen=True)
@@ -166,7 +189,7 @@ class KineticEnergyConfig(SecondaryConfig):
     """`objective=kinetic_energy`: the integral of the kinetic energy."""
 
     kind: str = fixed("kinetic_energy")
-    weights: ClassVar[tuple[float, float, float]] = (1.0, 0.0, 0.0)
+    weights: ClassVar[dict[str, float]] = {"kinetic_energy": 1.0}
 
 
 @dataclass(frozen=True)
@@ -174,7 +197,7 @@ class TorqueConfig(SecondaryConfig):
     """`objective=torque`: the integral of the squared joint torques."""
 
     kind: str = fixed("torque")
-    weights: ClassVar[tuple[float, float, float]] = (0.0, 1.0, 0.0)
+    weights: ClassVar[dict[str, float]] = {"torque": 1.0}
 
 
 @dataclass(frozen=True)
@@ -182,20 +205,47 @@ class VelocityNormConfig(SecondaryConfig):
     """`objective=velocity_norm`: the integral of the squared joint velocities."""
 
     kind: str = fixed("velocity_norm")
-    weights: ClassVar[tuple[float, float, float]] = (0.0, 0.0, 1.0)
+    weights: ClassVar[dict[str, float]] = {"velocity_norm": 1.0}
+
+
+@dataclass(frozen=True)
+class BaseRotationConfig(SecondaryConfig):
+    """`objective=base_rotation`: the integral of a floating base's squared angular velocity."""
+
+    kind: str = fixed("base_rotation")
+    weights: ClassVar[dict[str, float]] = {"base_rotation": 1.0}
+
+
+@dataclass(frozen=True)
+class ReactionConfig(SecondaryConfig):
+    """`objective=reaction`: weights of the integrals of the squared force and torque on a base that is held."""
+
+    kind: str = fixed("reaction")
+    force: float = number(0.0, low=0, unit="1/(N^2 s)")
+    torque: float = number(1.0, low=0, unit="1/(N^2 m^2 s)")
+
+    @property
+    def weights(self) -> dict[str, float]:
+        return {"reaction_force": self.force, "reaction_torque": self.torque}
 
 
 @dataclass(frozen=True)
 class WeightedConfig(SecondaryConfig):
-    """`objective=weighted`: a convex combination of kinetic energy and squared torques."""
+    """`objective=weighted`: a convex combination of kinetic energy, squared torques and a floating base's rotation."""
 
     kind: str = fixed("weighted")
     kinetic_energy: float = number(0.5, low=0, high=1)
     torque: float = number(0.5, low=0, high=1)
+    base_rotation: float = number(0.0, low=0, high=1)
 
     @property
-    def weights(self) -> tuple[float, float, float]:
-        return self.kinetic_energy, self.torque, 0.0
+    def weights(self) -> dict[str, float]:
+        return {"kinetic_energy": self.kinetic_energy, "torque": self.torque, "base_rotation": self.base_rotation}
+
+
+ObjectiveConfig = (
+    KineticEnergyConfig | TorqueConfig | VelocityNormConfig | BaseRotationConfig | ReactionConfig | WeightedConfig
+)
 
 
 @dataclass(frozen=True)
@@ -212,6 +262,7 @@ class LimitsConfig:
     velocity: float | list[float] | None = per_joint(above=0, unit="rad/s")
     torque: float | list[float] | None = per_joint(above=0, unit="N m")
     power: float | list[float] | None = per_joint(above=0, unit="W")
+    attitude: float | None = number(None, above=0, high=1.5, unit="rad")
 
 
 @dataclass(frozen=True)
@@ -352,7 +403,7 @@ class ParetoOptions:
     """Pareto front of two integrals: method `pareto`."""
 
     method: str = choice("epsilon_constraint", "epsilon_constraint", "weighting")
-    objectives: list[str] = choices(INTEGRALS, *INTEGRALS)
+    objectives: list[str] = choices(INTEGRALS[:2], *INTEGRALS)
     steps: int = count(10, low=2)
     rounds: int = count(3, low=0)
     tolerance: float = number(1e-8, above=0)
@@ -396,15 +447,18 @@ class RunConfig:
     methods: list[str] = choices(DEFAULT_METHODS, *METHODS)
     seed: int = count(1, low=0)
     robot: RobotConfig = part(RobotConfig)
+    base: FixedBaseConfig | FreeBaseConfig = one_of({"fixed": FixedBaseConfig, "free": FreeBaseConfig}, "fixed")
     path: LineConfig | CircleConfig | WaypointsConfig = one_of(
         {"line": LineConfig, "circle": CircleConfig, "waypoints": WaypointsConfig}, "line"
     )
     timing: TimingConfig = part(TimingConfig)
-    objective: KineticEnergyConfig | TorqueConfig | VelocityNormConfig | WeightedConfig = one_of(
+    objective: ObjectiveConfig = one_of(
         {
             "kinetic_energy": KineticEnergyConfig,
             "torque": TorqueConfig,
             "velocity_norm": VelocityNormConfig,
+            "base_rotation": BaseRotationConfig,
+            "reaction": ReactionConfig,
             "weighted": WeightedConfig,
         },
         "kinetic_energy",

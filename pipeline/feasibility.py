@@ -9,11 +9,12 @@ import numpy as np
 from pipeline.arm import Arm
 from pipeline.arrays import Array
 from pipeline.clearance import Clearance, Obstacles
+from pipeline.floating import FloatingArm
 from pipeline.costs import integrals, velocities
 from pipeline.problem import Problem
 from pipeline.transcription import Transcription
 
-UNITS = {"position": "rad", "velocity": "rad/s", "torque": "N m", "power": "W", "clearance": "m"}
+UNITS = {"position": "rad", "velocity": "rad/s", "torque": "N m", "power": "W", "clearance": "m", "attitude": "rad"}
 
 
 @dataclass(frozen=True)
@@ -53,9 +54,21 @@ def violations(problem: Problem, times: Array, q: Array) -> list[Violation]:
         ("power", np.abs(tau * qd), limits.power),
     ):
         found.append(_worst(kind, names, times, values, bound, bound, 1.0))
+    found.append(_turned(problem, times, q))
     if problem.obstacles is not None:
         found.append(_closest(problem.task.arm, problem.obstacles, times, q))
     return [violation for violation in found if violation is not None]
+
+
+def _turned(problem: Problem, times: Array, q: Array) -> Violation | None:
+    arm, bound = problem.task.arm, problem.bounds.attitude
+    if not np.isfinite(bound) or not isinstance(arm, FloatingArm):
+        return None
+    angle = np.arccos(np.clip(arm.attitude_cosine(q)[0], -1.0, 1.0))
+    knot = int(np.argmax(angle))
+    return Violation(
+        "attitude", "the base", bound, float(angle[knot]), float(times[knot]), float(angle[knot] / bound - 1)
+    )
 
 
 def _closest(arm: Arm, obstacles: Obstacles, times: Array, q: Array) -> Violation:

@@ -1,7 +1,7 @@
 """The part of an objective that depends on positions and velocities alone: L(q, qd) = 1/2 qd' G(q) qd - k0 w(q).
 
-G = a M(q) + 2 c I for a times the kinetic energy and c times the squared norm of the joint velocities: what the inertia
-matrix is to the kinetic energy, G is to L. Everything that solves such problems (transcription, dynamic programming,
+G = a M(q) + 2 c I + 2 d S(q) for a times the kinetic energy, c times the squared norm of the joint velocities and d times
+that of a floating base's angular velocity: what the inertia matrix is to the kinetic energy, G is to L. Everything that solves such problems (transcription, dynamic programming,
 calculus of variations, maximum principle, predictions) takes G, w and their derivatives from here.
 """
 
@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.arrays import Array
+from pipeline.floating import FloatingArm
 from pipeline.problem import Objective
 from pipeline.task import Task
 
@@ -20,27 +21,41 @@ class Lagrangian:
     def __init__(self, task: Task, objective: Objective) -> None:
         self.task, self.arm = task, task.arm
         self.inertia, self.norm, self.secondary = objective.kinetic_energy, objective.velocity_norm, objective.secondary
+        self.rotation = objective.base_rotation
+        self._of_joints = np.ones(self.arm.n)
+        self._of_joints[: self.arm.base_coordinates] = 0.0
 
     @property
     def is_quadratic(self) -> bool:
         """Whether velocities count at all."""
-        return self.inertia > 0 or self.norm > 0
+        return self.inertia > 0 or self.norm > 0 or self.rotation > 0
 
     def metric(self, q: Array) -> Array:
-        """G (K, n, n)."""
-        own = 2 * self.norm * np.eye(self.arm.n)
-        if self.inertia == 0:
-            return np.broadcast_to(own, (len(q), *own.shape)).copy()
-        return self.inertia * self.arm.mass_matrix(q) + own
+        """G (K, n, n); singular where only some of the coordinates of an arm on a moving base count."""
+        total = np.tile(2 * self.norm * np.diag(self._of_joints), (len(q), 1, 1))
+        if self.inertia:
+            total += self.inertia * self.arm.mass_matrix(q)
+        if self.rotation:
+            total += 2 * self.rotation * self._floating().turning_metric(q)
+        return total
+
+    def _floating(self) -> FloatingArm:
+        assert isinstance(self.arm, FloatingArm)  # prepare.py refuses other arms
+        return self.arm
 
     def quadratic(self, q: Array, qd: Array) -> Array:
         """1/2 qd' G qd (K,)."""
-        value = self.norm * (qd * qd).sum(axis=1)
-        return value + self.inertia * self.arm.kinetic_energy(q, qd) if self.inertia else value
+        value = self.norm * (qd * qd * self._of_joints).sum(axis=1)
+        if self.inertia:
+            value = value + self.inertia * self.arm.kinetic_energy(q, qd)
+        if self.rotation:
+            value = value + self.rotation * self._floating().turning(q, qd)[0]
+        return value
 
     def quadratic_gradient(self, q: Array, qd: Array) -> tuple[Array, Array, Array]:
         """1/2 qd' G qd (K,), its derivatives by q and by qd (K, n)."""
-        value, by_q, by_qd = self.norm * (qd * qd).sum(axis=1), np.zeros_like(q), 2 * self.norm * qd
+        counted = qd * self._of_joints
+        value, by_q, by_qd = self.norm * (qd * counted).sum(axis=1), np.zeros_like(q), 2 * self.norm * counted
         if self.inertia:
             energy, energy_by_q, momentum = self.arm.kinetic_energy_gradient(q, qd)
             value, by_q, by_qd = (
@@ -48,6 +63,9 @@ class Lagrangian:
                 self.inertia * energy_by_q,
                 by_qd + self.inertia * momentum,
             )
+        if self.rotation:
+            parts = zip((value, by_q, by_qd), self._floating().turning(q, qd), strict=True)
+            value, by_q, by_qd = (total + self.rotation * part for total, part in parts)
         return value, by_q, by_qd
 
     def bias(self, q: Array, qd: Array) -> Array:

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from pipeline import config as schema
-from pipeline import packages, urdf
+from pipeline import base, packages, urdf
 from pipeline.arm import Arm
 from pipeline.arrays import Array
 from pipeline.clearance import Clearance, Obstacles
@@ -67,8 +67,9 @@ def prepare(config: schema.RunConfig) -> Problem:
         obstacles=_obstacles(config.obstacles, arm),
     )
     _check(problem)
-    _require_reach(problem)
-    return problem
+    if config.base.kind == "fixed":
+        _require_reach(problem)
+    return base.place(problem, config)
 
 
 def load(robot: schema.RobotConfig, gravity: str | list[float] = "none") -> Arm:
@@ -142,21 +143,28 @@ def _limits(limits: schema.LimitsConfig, arm: Arm) -> Limits:
         velocity=bound("velocity", description.velocity if joint else free),
         torque=bound("torque", description.effort if all_of_them else free),
         power=bound("power", free),
+        attitude=np.inf if limits.attitude is None else limits.attitude,
     )
 
 
 def _objective(config: schema.RunConfig, arm: Arm) -> Objective:
     """The objective; joints are centred in the ranges of the description, or those that `limits` gives."""
     own = config.objective
+    weights: dict[str, Any] = {"kinetic_energy": 0.0, **own.weights}
+    if isinstance(own, schema.WeightedConfig) and abs(sum(own.weights.values()) - 1.0) > 1e-9:
+        names = " + ".join(f"objective.{name}" for name in own.weights)
+        raise ConfigError(f"{names} = {sum(own.weights.values()):g}: the weights must add up to 1")
+    if not any(own.weights.values()):
+        raise ConfigError(f"objective = {own.kind}: all its weights are zero")
     if not own.criteria:
-        return Objective(*own.weights)
+        return Objective(**weights)
     ranges = _limits(replace(config.limits, kind="joint"), arm)
     if "joint_centering" in own.criteria and not np.isfinite(ranges.upper - ranges.lower).any():
         raise ConfigError(
             f"objective.secondary = {own.secondary}: {arm.description.name} states no joint limits to centre its joints in; "
             "give limits.lower and limits.upper"
         )
-    return Objective(*own.weights, Secondary(own.criteria, own.k0, ranges.lower, ranges.upper))
+    return Objective(**weights, secondary=Secondary(own.criteria, own.k0, ranges.lower, ranges.upper))
 
 
 def _shape(name: str, shape: Any, frame: str | None = None) -> Shape:
@@ -199,9 +207,6 @@ def _check(problem: Problem) -> None:
         raise ConfigError(
             f"limits.lower of {names[joint]} ({limits.lower[joint]:.4g}) is not below limits.upper ({limits.upper[joint]:.4g})"
         )
-    weights = problem.objective.kinetic_energy + problem.objective.torque
-    if problem.objective.velocity_norm == 0 and abs(weights - 1.0) > 1e-9:
-        raise ConfigError(f"objective.kinetic_energy + objective.torque = {weights:g}: the weights must add up to 1")
     if problem.boundary is Boundary.FIXED:
         outside = np.flatnonzero((problem.q_init < limits.lower) | (problem.q_init > limits.upper))
         for joint in outside:

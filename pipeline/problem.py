@@ -36,16 +36,26 @@ class Status(enum.Enum):
 class Objective:
     """A sum of integrals: weights of the kinetic energy, the squared joint torques and the squared joint velocities;
     what `secondary` gains is taken off (Pontryagin report eq. (13) with the sign that maximises it).
+
+    Of the base: the squared angular velocity of one that floats; the squared force and torque on one that is held.
     """
 
     kinetic_energy: float = 1.0
     torque: float = 0.0
     velocity_norm: float = 0.0
     secondary: Secondary | None = None
+    base_rotation: float = 0.0
+    reaction_force: float = 0.0
+    reaction_torque: float = 0.0
+
+    @property
+    def second_order(self) -> bool:
+        """Whether accelerations count."""
+        return self.torque > 0 or self.reaction_force > 0 or self.reaction_torque > 0
 
 
-LIMIT_KINDS = ("position", "velocity", "torque", "power", "clearance")
-INTEGRALS = ("kinetic_energy", "torque")
+LIMIT_KINDS = ("position", "velocity", "torque", "power", "clearance", "attitude")
+INTEGRALS = ("kinetic_energy", "torque", "base_rotation", "reaction_force", "reaction_torque")
 
 
 @dataclass(frozen=True)
@@ -54,23 +64,35 @@ class IntegralBounds:
 
     kinetic_energy: float = np.inf
     torque: float = np.inf
+    base_rotation: float = np.inf
+    reaction_force: float = np.inf
+    reaction_torque: float = np.inf
+
+    def bounds(self, *names: str) -> bool:
+        """Whether one of the integrals `names` is bounded."""
+        return any(np.isfinite(getattr(self, name)) for name in names)
 
 
 @dataclass(frozen=True)
 class Limits:
-    """Bounds (n,) on joint motion; infinite where there are none. Units: rad, rad/s, N m, W."""
+    """Bounds (n,) on joint motion; infinite where there are none. Units: rad, rad/s, N m, W.
+
+    attitude [rad]: by how much a floating base may turn from its start, at any time.
+    """
 
     lower: Array
     upper: Array
     velocity: Array
     torque: Array
     power: Array
+    attitude: float = np.inf
 
     @property
     def any(self) -> bool:
         """Whether there is a limit at all."""
         return any(
-            np.isfinite(bound).any() for bound in (self.lower, self.upper, self.velocity, self.torque, self.power)
+            np.isfinite(bound).any()
+            for bound in (self.lower, self.upper, self.velocity, self.torque, self.power, self.attitude)
         )
 
     @classmethod

@@ -9,6 +9,7 @@ from pathlib import Path as File
 
 from pipeline import config as schema
 from pipeline import extras, resume
+from pipeline.errors import ConfigError
 from pipeline.evaluation import evaluate
 from pipeline.methods import calculus_of_variations, dynamic_programming, global_planner, lsv, pareto, pmke, pontryagin
 from pipeline.parallel import Workers
@@ -22,6 +23,8 @@ UNFINISHED = ".unfinished"  # finished solves of a run that is not finished: wha
 def state(config: schema.RunConfig) -> Problem:
     """The problem of a configuration, refused before anything is solved if a method asked for does not serve it."""
     problem = prepare(config)
+    if problem.task.arm.base_coordinates:
+        _require_fixed_base(config)
     if "dynamic_programming" in config.methods or (
         "global" in config.methods and config.method.global_.starts != "population"
     ):
@@ -31,6 +34,20 @@ def state(config: schema.RunConfig) -> Problem:
     if "pontryagin" in config.methods:
         pontryagin.check(problem)
     return problem
+
+
+def _require_fixed_base(config: schema.RunConfig) -> None:
+    """Refuse what a base that moves, or that is held for its reaction, is not served by: the attitude is a state."""
+    refused = {"dynamic_programming", "calculus_of_variations", "pontryagin"} & set(config.methods)
+    if refused:
+        raise ConfigError(
+            f"methods: {', '.join(sorted(refused))} serve arms on a fixed base; of a floating or held base serve lsv, "
+            "inertia_weighted, pmke, global and pareto"
+        )
+    if config.method.global_.starts != "population":
+        raise ConfigError(f"method.global.starts = {config.method.global_.starts}: allowed on such a base: population")
+    if config.closed_loop.run:
+        raise ConfigError("closed_loop.run: the controller is one for arms on a fixed base")
 
 
 def solve(

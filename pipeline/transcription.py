@@ -4,7 +4,7 @@ Every quantity that is penalised or limited is an unknown of its own, tied to th
 
     y_i = POSITION_SCALE q_i                                          at all knots,
     w_i = S_i qd_i,     qd_i = (q_i - q_(i-1)) / dt_i                 for every interval (linear),
-    u_i = s_i tau_i,    tau_i = M(q_i) qdd_i + n(q_i, qd_i)           only if torques or powers count,
+    u_i = s_i tau_i,    tau_i = M(q_i) qdd_i + n(q_i, qd_i)           of those forces and torques that count,
 
 with backward differences throughout: qdd_i = (qd_i - qd_(i-1)) / dt_i (PMKE paper eq. (4), Global paper eqs (3)-(6)).
 For the kinetic energy and the velocity norm, 1/2 qd' G qd (`lagrangian.py`), S_i = sqrt(dt_i / C) L_i' with
@@ -28,15 +28,18 @@ from pydrake.solvers import LinearConstraint, MathematicalProgram, QuadraticCons
 from pipeline import ipopt
 from pipeline.arrays import Array
 from pipeline.clearance import Clearance, Obstacles
-from pipeline.costs import Costs, integrals, velocities
+from pipeline.costs import Costs, integrals, row_kinds, velocities
 from pipeline.differentiable import DifferentiableConstraint, DifferentiableCost
+from pipeline.floating import FloatingArm
 from pipeline.lagrangian import Lagrangian, trapezoid_weights
 from pipeline.problem import INTEGRALS, Boundary, Problem
 
 POSITION_SCALE = 0.03
 VELOCITY_SCALE = 0.03  # for objectives without kinetic energy: small, like the positions
 KNOTS_PER_BINDING = 10  # a Python binding pays for its size squared: more, smaller bindings are cheaper up to a point
+SHARE = 0.1  # of the energy in the scaling of an objective to which not all velocities count
 Block = NDArray[np.int_]
+Rate = Callable[[Array, Array], tuple[Array, Array, Array]]  # of an integral, with its derivatives by q and qd
 
 
 class Transcription:
@@ -57,22 +60,26 @@ class Transcription:
         self.x_ref = problem.reference.position(times)
         self.integral_bounds = problem.integral_bounds
         self.lagrangian = Lagrangian(problem.task, self.objective)
-        self.bounds_energy = np.isfinite(self.integral_bounds.kinetic_energy)
-        self.counts_torque = self.objective.torque > 0 or np.isfinite(self.integral_bounds.torque)
-        self.lifts_torque = self.counts_torque or bool(
-            np.isfinite(self.limits.torque).any() or np.isfinite(self.limits.power).any()
-        )
+        self.nb = self.arm.base_coordinates
+        self.bounds_first_order = self.integral_bounds.bounds("kinetic_energy", "base_rotation")
+        self.kinds = row_kinds(self.arm)
+        limited = bool(np.isfinite(self.limits.torque).any() or np.isfinite(self.limits.power).any())
+        # The generalized forces that are unknowns, and what their squares weigh in the objective.
+        self.lifted = [row for row, kind in enumerate(self.kinds) if self._counts(kind) or (limited and row >= self.nb)]
+        self.row_weights = np.array([getattr(self.objective, self.kinds[row]) for row in self.lifted])
+        closed = problem.boundary is Boundary.CYCLIC
+        # A cycle of a floating base begins with a base velocity that is no interval's: its last one has turned since.
+        self.enters = bool(self.lifted) and closed and self.arm.floats
         self._tracking_rows: list[DifferentiableConstraint] = []
         self._sums: list[tuple[str, Any]] = []
         self._scale()
 
         self.program = MathematicalProgram()
-        positions, rates = (self.intervals + 1) * self.n, self.intervals * self.n
-        count = positions + rates * (2 if self.lifts_torque else 1)
-        unknowns = self.program.NewContinuousVariables(count, "x")
-        self.y = unknowns[:positions].reshape(-1, self.n)
-        self.w = unknowns[positions : positions + rates].reshape(-1, self.n)
-        self.u = unknowns[positions + rates :].reshape(-1, self.n)
+        sizes = [(self.intervals + 1) * self.n, self.intervals * self.n, self.n * self.enters]
+        unknowns = self.program.NewContinuousVariables(sum(sizes) + self.intervals * len(self.lifted), "x")
+        y, w, entry, u = np.split(unknowns, np.cumsum(sizes))
+        self.y, self.w, self.w_entry = (part.reshape(-1, self.n) for part in (y, w, entry))
+        self.u = u.reshape(self.intervals, -1)
 
         if elastic:
             self.excess = self.program.NewContinuousVariables(1, "excess")
@@ -81,17 +88,23 @@ class Transcription:
         self._link()
         self._bound_ends()
         self._limit()
-        closed = problem.boundary is Boundary.CYCLIC
         first_free = 1 if problem.boundary is Boundary.FIXED else 0
-        for block in _blocks(first_free, self.intervals + (0 if closed else 1)):
+        # Closed joints close the path, unless the base has moved under them.
+        for block in _blocks(first_free, self.intervals + (0 if closed and not self.arm.floats else 1)):
             self._add_tracking(block)
         for block in _blocks(0, self.intervals):
             if self.lagrangian.is_quadratic and not elastic:
                 self._add_quadratic(block)
-            if self.lifts_torque:
+            if self.lifted:
                 self._add_torque(block)
-        if self.objective.torque > 0 and not elastic:
-            flat = self.u.ravel()
+            if isinstance(self.arm, FloatingArm) and self.arm.floats:
+                self._conserve_momentum(self.arm, block)
+        if self.enters and isinstance(self.arm, FloatingArm):
+            self._enter(self.arm)
+        if np.isfinite(self.limits.attitude) and isinstance(self.arm, FloatingArm):
+            self._limit_attitude(self.arm)
+        if self.row_weights.any() and not elastic:
+            flat = self.u[:, self.row_weights > 0].ravel()
             self.program.AddQuadraticCost(2 * np.eye(len(flat)), np.zeros(len(flat)), flat, is_convex=True)
         if self.objective.secondary is not None and not elastic:
             for block in _blocks(0, self.intervals + 1):
@@ -106,8 +119,9 @@ class Transcription:
         for rows in self._tracking_rows:
             rows.forget()
         parts = [POSITION_SCALE * self.q_guess, self._to_w(self.qd_guess)]
-        if self.lifts_torque:
-            parts.append(self.torque_scale[:, None] * self.tau_guess)
+        if self.enters:
+            parts.append(np.linalg.solve(self.to_velocity[-1], self.qd_entry))
+        parts.append(self.torque_scale * self.tau_guess)
         if self.elastic:
             parts.append(np.ones(1))
         for _, sums in self._sums:
@@ -118,22 +132,25 @@ class Transcription:
 
     # --- scaling ------------------------------------------------------------------------------------------------
 
+    def _counts(self, kind: str) -> bool:
+        return getattr(self.objective, kind) > 0 or self.integral_bounds.bounds(kind)
+
     def _scale(self) -> None:
         """Choose S_i and s_i from the guess, so that the objective there is 1."""
         q, dt = self.q_guess, self.dt
         qd = velocities(self.problem, self.times, q)
-        self.qd_guess = qd[1:]
+        self.qd_entry, self.qd_guess = qd[0], qd[1:]
         costs: Costs = integrals(self.problem, self.times, q)
-        self.tau_guess = costs.tau[1:]
-        quadratic = (
-            self.objective.kinetic_energy * costs.kinetic_energy + self.objective.velocity_norm * costs.velocity_norm
-        )
-        self.cost = (quadratic + self.objective.torque * costs.torque + abs(costs.gain)) or 1.0
+        self.tau_guess = costs.tau[1:, self.lifted]
+        self.cost = costs.value(self.objective) or 1.0
         self.energy = costs.kinetic_energy if costs.kinetic_energy > 0 else 1.0
-        if self.lagrangian.is_quadratic or self.bounds_energy:
+        if self.lagrangian.is_quadratic or self.bounds_first_order:
             # Half |w|^2 is the energy's share of the cost, or its ratio to the guess's where it is only bounded.
             share = 1 / self.cost if self.lagrangian.is_quadratic else 1 / self.energy
             metric = self.lagrangian.metric(q[1:]) if self.lagrangian.is_quadratic else self.arm.mass_matrix(q[1:])
+            if self.nb and self.lagrangian.inertia == 0:
+                # Not all velocities count: a share of the energy makes it regular.
+                metric = metric + SHARE * self.cost / self.energy * self.arm.mass_matrix(q[1:])
             root = np.linalg.cholesky(metric)
             factor = 1 / np.sqrt(share * dt)[:, None, None]
             self.to_velocity = factor * np.linalg.inv(root).transpose(0, 2, 1)  # qd_i = to_velocity_i w_i
@@ -141,13 +158,14 @@ class Transcription:
         else:
             self.to_velocity = np.tile(np.eye(self.n) / VELOCITY_SCALE, (self.intervals, 1, 1))
             self.diagonal = True
-        if self.objective.torque > 0:
-            self.torque_scale = np.sqrt(self.objective.torque * dt / self.cost)
-        elif self.counts_torque:
-            self.torque_scale = np.sqrt(dt / (costs.torque if costs.torque > 0 else 1.0))
-        else:
-            size = float(np.sqrt(np.mean(self.tau_guess**2))) or 1.0
-            self.torque_scale = np.full(self.intervals, 0.1 / (size * np.sqrt(self.intervals)))
+        size = float(np.sqrt(np.mean(self.tau_guess**2))) if self.lifted else 1.0
+        self.torque_scale = np.full((self.intervals, len(self.lifted)), 0.1 / ((size or 1.0) * np.sqrt(self.intervals)))
+        for column, row in enumerate(self.lifted):
+            weight, total = self.row_weights[column], getattr(costs, self.kinds[row])
+            if weight > 0:
+                self.torque_scale[:, column] = np.sqrt(weight * dt / self.cost)
+            elif self.integral_bounds.bounds(self.kinds[row]):
+                self.torque_scale[:, column] = np.sqrt(dt / (total if total > 0 else 1.0))
 
     def _to_w(self, qd: Array) -> Array:
         return np.linalg.solve(self.to_velocity, qd[:, :, None])[:, :, 0]
@@ -165,13 +183,19 @@ class Transcription:
         self.program.AddLinearEqualityConstraint(rows, np.zeros(count * n), unknowns)
 
     def _bound_ends(self) -> None:
+        start, nb = POSITION_SCALE * self.problem.q_init, self.nb
         if self.problem.boundary is Boundary.FIXED:
-            start = POSITION_SCALE * self.problem.q_init
             self.program.AddBoundingBoxConstraint(start, start, self.y[0])
+        elif nb:
+            self.program.AddBoundingBoxConstraint(start[:nb], start[:nb], self.y[0, :nb])
+        if nb and not self.arm.floats:
+            still = np.tile(start[:nb], self.intervals)
+            self.program.AddBoundingBoxConstraint(still, still, self.y[1:, :nb].ravel())
         if self.problem.boundary is Boundary.CYCLIC:
-            closing = np.hstack([np.eye(self.n), -np.eye(self.n)])
-            ends = np.concatenate([self.y[0], self.y[-1]])
-            self.program.AddLinearEqualityConstraint(closing, np.zeros(self.n), ends)
+            joints = self.n - nb
+            closing = np.hstack([np.eye(joints), -np.eye(joints)])
+            ends = np.concatenate([self.y[0, nb:], self.y[-1, nb:]])
+            self.program.AddLinearEqualityConstraint(closing, np.zeros(joints), ends)
 
     def _limit(self) -> None:
         limits, count = self.limits, self.intervals
@@ -186,7 +210,7 @@ class Transcription:
             rows = None if self.diagonal else sp.block_diag(list(self.to_velocity / size[:, None, None]))
             self._keep_within("velocity", -bound, bound, self.w.ravel(), bound, rows)
         if np.isfinite(limits.torque).any():
-            bound = (limits.torque * self.torque_scale[:, None]).ravel()
+            bound = (limits.torque[self.lifted] * self.torque_scale).ravel()
             self._keep_within("torque", -bound, bound, self.u.ravel(), bound)
         for joint in np.flatnonzero(np.isfinite(limits.power)):
             self._limit_power(int(joint), float(limits.power[joint]))
@@ -216,8 +240,9 @@ class Transcription:
             row = self.to_velocity[i, joint]
             used = np.flatnonzero(row)
             form = np.zeros((len(used) + 1, len(used) + 1))
-            form[0, 1:] = form[1:, 0] = row[used] / (self.torque_scale[i] * power)
-            unknowns = np.concatenate([[self.u[i, joint]], self.w[i, used]])
+            column = self.lifted.index(joint)
+            form[0, 1:] = form[1:, 0] = row[used] / (self.torque_scale[i, column] * power)
+            unknowns = np.concatenate([[self.u[i, column]], self.w[i, used]])
             indefinite = QuadraticConstraint.HessianType.kIndefinite
             if "power" not in self.elastic:
                 constraint = QuadraticConstraint(form, np.zeros(len(form)), -1.0, 1.0, indefinite)
@@ -231,9 +256,7 @@ class Transcription:
 
     # --- nonlinear terms, KNOTS_PER_BINDING knots each ----------------------------------------------------------
 
-    def _energy(
-        self, gradient: Callable[[Array, Array], tuple[Array, Array, Array]], block: Block, weight: Array
-    ) -> Callable[[Array], tuple[float, Array]]:
+    def _energy(self, gradient: Rate, block: Block, weight: Array) -> Callable[[Array], tuple[float, Array]]:
         """The sum of weight_i T_i over a block, by (y, w), for T (K,) with its gradients by q and qd."""
         shape, to_velocity = (len(block), self.n), self.to_velocity[block]
         split = len(block) * self.n
@@ -273,15 +296,18 @@ class Transcription:
             sums = self.program.NewContinuousVariables(len(blocks), f"{kind}_sums")
             for block, total in zip(blocks, sums, strict=True):
                 if kind == "kinetic_energy":
-                    self._bound_energy(block, total, bound)
+                    self._bound_first_order(self.arm.kinetic_energy_gradient, block, total, bound)
+                elif kind == "base_rotation":
+                    assert isinstance(self.arm, FloatingArm)
+                    self._bound_first_order(self.arm.turning, block, total, bound)
                 else:
-                    self._bound_torque(block, total, bound)
+                    self._bound_squares(kind, block, total, bound)
             # Scaled by the bound: the sums add up to at most 1.
             self.program.AddLinearConstraint(np.ones((1, len(sums))), [-np.inf], [1.0], sums)
             self._sums.append((kind, sums))
 
-    def _bound_energy(self, block: Block, total: Any, bound: float) -> None:
-        energy = self._energy(self.arm.kinetic_energy_gradient, block, self.dt[block] / bound)
+    def _bound_first_order(self, gradient: Rate, block: Block, total: Any, bound: float) -> None:
+        energy = self._energy(gradient, block, self.dt[block] / bound)
 
         def excess(x: Array) -> tuple[Array, Array]:
             value, gradient = energy(x[:-1])
@@ -290,14 +316,15 @@ class Transcription:
         unknowns = np.concatenate([self.y[block + 1].ravel(), self.w[block].ravel(), [total]])
         self.program.AddConstraint(DifferentiableConstraint(excess), lb=[-np.inf], ub=[0.0], vars=unknowns)
 
-    def _bound_torque(self, block: Block, total: Any, bound: float) -> None:
+    def _bound_squares(self, kind: str, block: Block, total: Any, bound: float) -> None:
         # u = s tau, and the integral is the sum of tau'tau dt.
-        weight = np.repeat(self.dt[block] / (self.torque_scale[block] ** 2 * bound), self.n)
+        own = [column for column, row in enumerate(self.lifted) if self.kinds[row] == kind]
+        weight = (self.dt[block, None] / (self.torque_scale[np.ix_(block, own)] ** 2 * bound)).ravel()
         form = np.diag(np.append(2 * weight, 0.0))
         linear = np.append(np.zeros(len(weight)), -1.0)
         convex = QuadraticConstraint.HessianType.kPositiveSemidefinite
         constraint = QuadraticConstraint(form, linear, -np.inf, 0.0, convex)
-        self.program.AddConstraint(constraint, np.append(self.u[block].ravel(), total))
+        self.program.AddConstraint(constraint, np.append(self.u[np.ix_(block, own)].ravel(), total))
 
     def _add_tracking(self, knots: Block) -> None:
         """x(q_i) = x_ref,i, and for poses R(q_i) = R_ref,i."""
@@ -340,13 +367,13 @@ class Transcription:
 
     def _add_torque(self, block: Block) -> None:
         """u_i = s_i (M(q_i) qdd_i + n(q_i, qd_i)), with qd_(i-1) from the interval before."""
-        count, n = len(block), self.n
+        count, n, lifted = len(block), self.n, self.lifted
         before = self._before(block[0])
         has_before = before is not None
         own = count + (1 if has_before else 0)
         step, scale, to_velocity = self.dt[block], self.torque_scale[block], self.to_velocity[block]
         intervals = block if before is None else np.concatenate([[before], block])
-        rate = self.to_velocity[intervals]
+        rate = np.concatenate([self.to_velocity, self.to_velocity[-1:]])[intervals]
         given = self.problem.qd_init
         came_with = (np.zeros(n) if given is None else given)[None]
         at_speed = not has_before and given is None and not self.problem.reference.timing.at_rest
@@ -360,10 +387,11 @@ class Transcription:
             qd = all_qd[offset:]
             first = all_qd[:1] if has_before else qd[:1] if at_speed else came_with
             previous = np.vstack([first, qd[:-1]])
-            tau, by_q, by_qd, by_qdd = self.arm.inverse_dynamics_gradient(q, qd, (qd - previous) / step[:, None])
+            all_rows = self.arm.inverse_dynamics_gradient(q, qd, (qd - previous) / step[:, None])
+            tau, by_q, by_qd, by_qdd = (values[:, lifted] for values in all_rows)
             by_qdd = by_qdd / step[:, None, None]
-            rows = np.zeros((count, n, x.size // n, n))
-            factor = scale[:, None, None]
+            rows = np.zeros((count, len(lifted), count + own, n))
+            factor = scale[:, :, None]
             rows[diagonal, :, diagonal] = -factor * by_q / POSITION_SCALE
             rows[diagonal, :, count + offset + diagonal] = -factor * (by_qd + by_qdd) @ to_velocity
             if at_speed:
@@ -371,24 +399,91 @@ class Transcription:
             late = diagonal if has_before else diagonal[1:]
             earlier = count + offset - 1 + late
             rows[late, :, earlier] += factor[late] * by_qdd[late] @ rate[offset - 1 + late]
-            rows[diagonal, :, count + own + diagonal] = np.eye(n)
-            value = x[split_w:].reshape(count, n) - scale[:, None] * tau
-            return value.ravel(), rows.reshape(count * n, x.size)
+            value = x[split_w:].reshape(count, -1) - scale * tau
+            size = count * len(lifted)
+            return value.ravel(), np.hstack([rows.reshape(size, -1), np.eye(size)])
 
-        unknowns = np.concatenate([self.y[block + 1].ravel(), self.w[intervals].ravel(), self.u[block].ravel()])
+        rates = np.concatenate([self.w, self.w_entry])[intervals]
+        unknowns = np.concatenate([self.y[block + 1].ravel(), rates.ravel(), self.u[block].ravel()])
         pattern = []
         for k in range(count):
             columns = {k, count + offset + k, *([count + offset + k - 1] if k or has_before else [])}
-            for i in range(n):
-                pattern += [(k * n + i, c * n + j) for c in sorted(columns) for j in range(n)]
-                pattern.append((k * n + i, (count + own + k) * n + i))
-        self._add_rows(torque, np.zeros(count * n), unknowns, pattern)
+            for i in range(len(lifted)):
+                row = k * len(lifted) + i
+                pattern += [(row, c * n + j) for c in sorted(columns) for j in range(n)]
+                pattern.append((row, split_w + row))
+        self._add_rows(torque, np.zeros(count * len(lifted)), unknowns, pattern)
+
+    # --- a base that floats -------------------------------------------------------------------------------------
+
+    def _conserve_momentum(self, arm: FloatingArm, block: Block) -> None:
+        """M_b qd_i = p at the middle of every interval, q_(i-1) + dt_i / 2 qd_i: of second order in the step."""
+        self._momentum_rows(arm, self.y[block], self.w[block], block, self.dt[block] / 2)
+
+    def _enter(self, arm: FloatingArm) -> None:
+        """The velocity that a cycle is entered with: the joints' is the last interval's, the base's follows from momentum."""
+        nb, last = self.nb, np.array([self.intervals - 1])
+        joints = self.to_velocity[-1][nb:] / np.abs(self.to_velocity[-1][nb:]).max()
+        both = np.hstack([joints, -joints])
+        unknowns = np.concatenate([self.w_entry[0], self.w[-1]])
+        self.program.AddLinearEqualityConstraint(both, np.zeros(len(joints)), unknowns)
+        self._momentum_rows(arm, self.y[:1], self.w_entry, last, np.zeros(1))
+
+    def _momentum_rows(self, arm: FloatingArm, y: Any, w: Any, intervals: Block, ahead: Array) -> None:
+        """M_b qd = p `ahead` [s] of the positions y, each row divided by M_bb of the guess and the size of its velocity."""
+        nb, n, count = self.nb, self.n, len(intervals)
+        rate = self.to_velocity[intervals]
+        size = np.abs(rate[:, :nb]).max(axis=2)
+        weight = np.linalg.inv(arm.mass_matrix(self.q_guess[intervals])[:, :nb, :nb]) / size[:, :, None]
+        diagonal, split = np.arange(count), count * n
+
+        def momentum(x: Array) -> tuple[Array, Array]:
+            qd = (rate @ x[split:].reshape(count, n, 1))[:, :, 0]
+            q = x[:split].reshape(count, n) / POSITION_SCALE + ahead[:, None] * qd
+            value, by_q, by_qd = arm.momentum_residual(q, qd)
+            rows = np.zeros((count, nb, 2 * count, n))
+            rows[diagonal, :, diagonal] = weight @ by_q / POSITION_SCALE
+            rows[diagonal, :, count + diagonal] = weight @ (by_qd + ahead[:, None, None] * by_q) @ rate
+            return (weight @ value[:, :, None]).ravel(), rows.reshape(count * nb, -1)
+
+        pattern = [
+            (k * nb + i, c * n + j) for k in range(count) for i in range(nb) for c in (k, count + k) for j in range(n)
+        ]
+        self._add_rows(momentum, np.zeros(count * nb), np.concatenate([y.ravel(), w.ravel()]), pattern)
+
+    def _limit_attitude(self, arm: FloatingArm) -> None:
+        """The base's turn from its start at all knots: a bound on yaw in the plane, else on its cosine."""
+        bound = self.limits.attitude
+        if arm.planar:
+            most = np.full(self.intervals, POSITION_SCALE * bound)
+            self._keep_within("attitude", -most, most, self.y[1:, 2], most)
+            return
+        soft = "attitude" in self.elastic
+        room = 1 - np.cos(bound)
+        for knots in _blocks(1, self.intervals + 1):
+            count, split = len(knots), len(knots) * 3
+
+            def rows(x: Array, count: int = count, split: int = split) -> tuple[Array, Array]:
+                q = np.zeros((count, self.n))
+                q[:, 3:6] = x[:split].reshape(count, 3) / POSITION_SCALE
+                cosine, by_q = arm.attitude_cosine(q)
+                jacobian = np.zeros((count, x.size))
+                for k in range(count):
+                    jacobian[k, 3 * k : 3 * k + 3] = -by_q[k, 3:6] / (POSITION_SCALE * room)
+                jacobian[:, split:] = -1.0
+                return (1 - cosine) / room - x[split:].sum(), jacobian
+
+            unknowns = np.concatenate([self.y[knots, 3:6].ravel(), self.excess if soft else []])
+            free = np.full(count, -np.inf)
+            self.program.AddConstraint(DifferentiableConstraint(rows), lb=free, ub=np.ones(count), vars=unknowns)
 
     def _before(self, interval: int) -> int | None:
         """The interval whose velocity precedes this one's; None where the motion begins."""
         if interval > 0:
             return interval - 1
-        return self.intervals - 1 if self.problem.boundary is Boundary.CYCLIC else None
+        if self.problem.boundary is not Boundary.CYCLIC:
+            return None
+        return self.intervals if self.enters else self.intervals - 1
 
     def _add_rows(self, function: Any, target: Array, unknowns: Any, pattern: list[tuple[int, int]]) -> Any:
         rows = DifferentiableConstraint(function)

@@ -288,23 +288,28 @@ def _check_inertia(
 
 def link_masses(description: Description) -> dict[str, float]:
     """The mass [kg] that each moving joint carries rigidly, up to the next moving joints."""
+    joints = ET.fromstring(description.xml).findall("joint")
+    names = {joint.get("name", ""): joint for joint in joints}
+    return {name: _rigid_mass(description, _end(names[name], "child")) for name in description.joints}
+
+
+def root_mass(description: Description) -> float:
+    """The mass [kg] of the root link and of all that is fixed to it."""
+    return _rigid_mass(description, description.base)
+
+
+def _rigid_mass(description: Description, link: str) -> float:
     root = ET.fromstring(description.xml)
-    links, joints = _by_name(root, "link", description.file), root.findall("joint")
-    masses = {}
-    for joint in joints:
-        if joint.get("name") not in description.joints:
-            continue
-        total, queue = 0.0, [_end(joint, "child")]
-        while queue:
-            link = queue.pop()
-            total += _mass(links[link], description.file)
-            queue += [
-                _end(other, "child")
-                for other in joints
-                if _end(other, "parent") == link and other.get("name") not in description.joints
-            ]
-        masses[joint.get("name", "")] = total
-    return masses
+    links, total, queue = _by_name(root, "link", description.file), 0.0, [link]
+    while queue:
+        link = queue.pop()
+        total += _mass(links[link], description.file)
+        queue += [
+            _end(joint, "child")
+            for joint in root.findall("joint")
+            if _end(joint, "parent") == link and joint.get("name") not in description.joints
+        ]
+    return total
 
 
 def _mass(link: ET.Element, file: Path) -> float:

@@ -17,7 +17,7 @@ from pipeline.arrays import Array
 from pipeline.candidates import distinct, diverse, population, ranking, starting_points
 from pipeline.clearance import Clearance, Obstacles
 from pipeline.config import GlobalOptions
-from pipeline.costs import objective_values
+from pipeline.costs import SECOND_ORDER, objective_values
 from pipeline.feasibility import Relaxed, least_violation, violations
 from pipeline.kinematics import wrap
 from pipeline.lagrangian import Lagrangian
@@ -165,15 +165,16 @@ def _optimise_start(context: tuple[Problem, Array, GlobalOptions], guess: Array)
     problem, times, options = context
     solves: list[dict[str, Any]] = []
     first: Optimum | None = None
-    if problem.objective.torque > 0 or _limits_torque(problem):
+    if problem.objective.second_order or _limits_torque(problem):
         first_order = Lagrangian(problem.task, problem.objective).is_quadratic
-        objective = replace(problem.objective, torque=0.0) if first_order else Objective()
+        only = replace(problem.objective, torque=0.0, reaction_force=0.0, reaction_torque=0.0)
+        objective = only if first_order else Objective()
         first = _optimise(replace(_without_torque_limits(problem), objective=objective), times, guess, options)
         solves += first.solves
         if not first.converged:
             return replace(first, solves=solves)
         guess = first.q
-        if problem.objective.torque == 0 and _keeps_torque_limits(problem, times, guess):
+        if not problem.objective.second_order and _keeps_torque_limits(problem, times, guess):
             return first
     optimum = _optimise(problem, times, guess, options)
     goes_on = len(times) < len(problem.times)
@@ -211,8 +212,12 @@ def _optimise_lazily(
     problem: Problem, times: Array, guess: Array, options: GlobalOptions, keep_off: float = 0.0
 ) -> Optimum:
     """As `_optimise`; but where torque limits alone bring torques in and the guess keeps them, it is tried without."""
-    torque_counts = problem.objective.torque > 0 or np.isfinite(problem.integral_bounds.torque)
-    if torque_counts or not _limits_torque(problem) or not _keeps_torque_limits(problem, times, guess):
+    if (
+        problem.objective.second_order
+        or problem.integral_bounds.bounds(*SECOND_ORDER)
+        or not _limits_torque(problem)
+        or not _keeps_torque_limits(problem, times, guess)
+    ):
         return _optimise(problem, times, guess, options, keep_off)
     optimum = _optimise(_without_torque_limits(problem), times, guess, options, keep_off)
     if not optimum.converged or _keeps_torque_limits(problem, times, optimum.q):

@@ -8,7 +8,7 @@ improves, so that a front that jumps between classes of paths is followed.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -178,16 +178,19 @@ def _values(problem: Problem, options: ParetoOptions, q: Array) -> tuple[float, 
 
 
 def _only(name: str) -> Objective:
-    return Objective(float(name == "kinetic_energy"), float(name == "torque"))
+    return _sum({name: 1.0})
+
+
+def _sum(weights: Mapping[str, float]) -> Objective:
+    return Objective(**{"kinetic_energy": 0.0, **weights})
 
 
 def _objective(options: ParetoOptions, weights: tuple[float, float]) -> Objective:
-    of = dict(zip(options.objectives, weights, strict=True))
-    return Objective(of.get("kinetic_energy", 0.0), of.get("torque", 0.0))
+    return _sum(dict(zip(options.objectives, weights, strict=True)))
 
 
 def _weighted(options: ParetoOptions, weights: Array) -> Objective:
-    return Objective(**dict(zip(options.objectives, (weights / weights.sum()).tolist(), strict=True)))
+    return _sum(dict(zip(options.objectives, (weights / weights.sum()).tolist(), strict=True)))
 
 
 def _report(problem: Problem, points: Sequence[Point], options: ParetoOptions) -> list[Solution]:
