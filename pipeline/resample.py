@@ -87,8 +87,8 @@ def sentence(exported: Resampled) -> str:
     for kind, excess in over:
         time, joint = exported.worst[kind]
         whose = f" of {joint}" if kind != "clearance" else ""
-        parts.append(f"exceeds the {kind} limit{whose} by {100 * excess:.2g} % at t = {time:.3g} s")
+        parts.append(f"exceeds the {kind} limit{whose} by {100 * excess:.3g} % at t = {time:.3g} s")
     return (
-        f"{head}, but {' and '.join(parts)}: the curve between knots, which starts and ends at rest, asks for more than "
-        "the knots; more intervals (timing.steps) or tighter limits give room"
+        f"{head}, but {' and '.join(parts)}; where the knots keep their limits, the curve between them, which starts and ends "
+        "at rest, asks for more: more intervals (timing.steps) or tighter limits give room"
     )
