@@ -33,7 +33,12 @@ class Answer:
 Run = Callable[..., Answer]
 
 
-def call(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], *words: str) -> Answer:
+def call(
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+    *words: str,
+    entry: Callable[[], int] = __main__.main,
+) -> Answer:
     """The command line within this process: no imports to wait for."""
     monkeypatch.setenv("HYDRA_FULL_ERROR", "0")  # main() sets it; this puts it back
     monkeypatch.setattr(session, "exit_code", 0)
@@ -41,7 +46,7 @@ def call(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], *wo
     GlobalHydra.instance().clear()
     capfd.readouterr()
     try:
-        code = __main__.main()
+        code = entry()
     except SystemExit as leaving:
         code = int(leaving.code or 0)
     finally:
