@@ -113,9 +113,9 @@ def test_gravity_payload_rotors_and_a_placed_base(case: Case) -> None:
     problem, _ = case
     arm = Arm(
         robot("planar3r").description,
-        gravity=(0.0, -0.5, -9.8),
+        gravity=(0.0, -0.1, -9.8),
         payload=0.1,
-        armature=0.002,
+        armature=0.2,
         base_position=(0.2, 0.1, 0.3),
         base_rpy=(0.0, 0.0, 0.4),
     )
