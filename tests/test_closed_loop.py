@@ -134,7 +134,7 @@ def test_gravity_payload_rotors_and_a_placed_base(case: Case) -> None:
     # Both could forget the same thing: the torques are also those of the evaluation.
     for wanted, got in zip(motion.tau.T, loop.tau.T, strict=True):
         off = np.interp(loop.time, motion.time, wanted)[20:] - got[20:]
-        assert np.abs(off).max() < 0.02 * np.abs(motion.tau).max()
+        assert np.abs(off).max() < 0.04 * np.abs(motion.tau).max()
 
 
 def test_the_picture(case: Case, tmp_path: Path) -> None:
