@@ -247,7 +247,7 @@ SOLIDS = [
 ]
 
 
-@pytest.mark.parametrize(("solid", "volume"), zip(SOLIDS, [5.236e-4, 6e-3, 1.3776e-3], strict=True))
+@pytest.mark.parametrize(("solid", "volume"), [*zip(SOLIDS, [5.236e-4, 6e-3, 1.3776e-3], strict=True)])
 def test_an_obstacle_is_as_large_as_it_is(solid: Shape, volume: float) -> None:
     hull = ConvexHull(solids.surface(solid))
     assert hull.volume == pytest.approx(volume, rel=0.05)
