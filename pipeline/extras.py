@@ -10,7 +10,7 @@ import pandas as pd
 from pipeline import candidate_study, certificate, closed_loop, convergence, front, resample, validation
 from pipeline.config import ExportConfig, RunConfig
 from pipeline.costs import objective_values
-from pipeline.evaluation import Evaluation
+from pipeline.evaluation import LIMITS, Evaluation
 from pipeline.problem import Problem, Status
 
 FEW = 4  # motions between the extremes of a front that the figures show
@@ -62,8 +62,13 @@ def compute(problem: Problem, config: RunConfig, evaluations: Sequence[Evaluatio
 
 
 def _chosen(export: ExportConfig, evaluations: Sequence[Evaluation]) -> Evaluation | None:
-    """The motion to export; None if there is no confirmed one, or none is asked for."""
+    """The motion to export; None if there is no confirmed one, or none is asked for.
+
+    The best one keeps every limit and every clearance at its knots: a method that knows none may go cheaply through a wall.
+    """
     good = [e for e in evaluations if e.status is Status.SOLVED and export.method in ("best", e.method)]
+    if export.method == "best":
+        good = [e for e in good if max(e.limit_excess.values(), default=0.0) <= LIMITS]
     # Of a method with several optima, and of all methods, the cheapest by the problem's own objective.
     return min(good, key=lambda e: e.objective, default=None) if export.method != "none" else None
 

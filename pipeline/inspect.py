@@ -17,6 +17,7 @@ from rich.table import Table
 from scipy.optimize import minimize
 
 from pipeline import config as schema
+from pipeline import session
 from pipeline.arm import Arm
 from pipeline.arrays import Array
 from pipeline.packages import resolve
@@ -72,7 +73,8 @@ def inspect(robot: schema.RobotConfig, gravity: str | list[float] = "none") -> F
         if (file := resolve(mesh, description.file.parent)) is None or not file.is_file()
     ]
     if missing:
-        notes.append(f"{len(missing)} mesh files not found, such as {missing[0]}: the arm is drawn without them")
+        count = f"{len(missing)} mesh file{'s' * (len(missing) > 1)}"
+        notes.append(f"{count} not found, such as {missing[0]}: the arm is drawn without")
     return Facts(arm, q_init, link_masses(description), reach(arm), ranks(arm), notes)
 
 
@@ -150,11 +152,17 @@ def sweep(facts: Facts) -> tuple[Array, Array]:
     return np.linspace(0.0, SECONDS * facts.arm.n, len(q)), q
 
 
+class Session(session.Session):
+    """Hydra's hooks: nothing is planned, so neither path nor methods are checked before the output folder is made."""
+
+    def check(self, asked: schema.RunConfig) -> None:
+        initial(asked.robot, load(asked.robot, asked.gravity))
+
+
 def job(values: DictConfig) -> int:
     """Print and record one arm."""
     from hydra.core.hydra_config import HydraConfig
 
-    from pipeline import session
     from pipeline.artifacts import arm_recording
 
     folder = Path(HydraConfig.get().runtime.output_dir)
@@ -168,8 +176,13 @@ def job(values: DictConfig) -> int:
     return 0
 
 
-if __name__ == "__main__":
+def main() -> int:
+    """The command line."""
     from pipeline.__main__ import run_job
 
-    # Nothing is planned: the check of the path and the methods before a run is left out.
-    sys.exit(run_job(job, ["hydra.run.dir=outputs/inspect/${robot.name}", "~hydra.callbacks.session"]))
+    hooks = "hydra.callbacks.session._target_=pipeline.inspect.Session"
+    return run_job(job, ["hydra.run.dir=outputs/inspect/${robot.name}", hooks])
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -61,7 +61,10 @@ def _folders(name: str, beside: Path | None) -> Iterator[Path]:
         yield Path(root) / "cmeel.prefix" / "share" / name
     yield Path(sys.prefix) / "share" / name
     module = name.replace("-", "_")
-    if module.isidentifier() and module not in sys.modules:
-        spec = importlib.util.find_spec(module)
+    if module.isidentifier():
+        try:
+            spec = importlib.util.find_spec(module)
+        except ValueError:  # a module without a spec, such as __main__
+            return
         for location in (spec.submodule_search_locations or []) if spec is not None else []:
             yield Path(location)

@@ -14,7 +14,7 @@ from pipeline.problem import Boundary, Problem
 
 @dataclass(frozen=True)
 class Resampled:
-    """Samples at time (K,) [s]: q, qd, qdd (K, n); and what the evaluation's own plant says of them.
+    """Samples at time (K,) [s]: q, qd, qdd (K, n); and what the evaluation's own plant says of their curve.
 
     limit_excess: by kind, relative (see evaluation.limit_excess); worst: where each is largest, (time [s], joint).
     """
@@ -36,6 +36,7 @@ class Resampled:
 
 
 TOLERANCE = 1e-6  # relative: of limits that are met
+BETWEEN = 4  # sub-intervals per knot interval at which the curve is judged, besides its samples
 
 
 def curve(problem: Problem, time: Array, q: Array) -> CubicSpline:
@@ -55,9 +56,12 @@ def resample(problem: Problem, evaluation: Evaluation, rate: float) -> Resampled
     duration = float(evaluation.time[-1])
     time = np.append(np.arange(0.0, duration - 1e-9, 1.0 / rate), duration)
     q, qd, qdd = spline(time), spline(time, 1), spline(time, 2)
-    checked = audit(problem, time, q, qd, qdd)
+    knots = evaluation.time
+    fine = np.interp(np.arange(BETWEEN * (len(knots) - 1) + 1) / BETWEEN, np.arange(len(knots)), knots)
+    judged = np.union1d(time, fine)  # a slow rate must not hide what happens between its samples
+    checked = audit(problem, judged, spline(judged), spline(judged, 1), spline(judged, 2))
     names = problem.task.arm.description.joints
-    worst = {kind: (float(time[row]), names[joint]) for kind, (row, joint) in checked.worst.items()}
+    worst = {kind: (float(judged[row]), names[joint]) for kind, (row, joint) in checked.worst.items()}
     return Resampled(
         evaluation.method,
         evaluation.solution.optimum,
@@ -87,8 +91,8 @@ def sentence(exported: Resampled) -> str:
     for kind, excess in over:
         time, joint = exported.worst[kind]
         whose = f" of {joint}" if kind != "clearance" else ""
-        parts.append(f"exceeds the {kind} limit{whose} by {100 * excess:.2g} % at t = {time:.3g} s")
+        parts.append(f"exceeds the {kind} limit{whose} by {100 * excess:.3g} % at t = {time:.3g} s")
     return (
-        f"{head}, but {' and '.join(parts)}: the curve between knots, which starts and ends at rest, asks for more than "
-        "the knots; more intervals (timing.steps) or tighter limits give room"
+        f"{head}, but {' and '.join(parts)}; where the knots keep their limits, the curve between them, which starts and ends "
+        "at rest, asks for more: more intervals (timing.steps) or tighter limits give room"
     )

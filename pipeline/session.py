@@ -37,16 +37,19 @@ class Session(Callback):
 
     def on_run_start(self, config: DictConfig, **_: Any) -> None:
         """Refuse bad input before Hydra makes the output folder."""
-        from pipeline.parallel import Workers
-        from pipeline.run import state
-
         try:
-            asked = checked(config)
-            state(asked)
-            Workers(address=asked.parallel.address).check()
+            self.check(checked(config))
         except InputError as error:
             print(f"error: {error}", file=sys.stderr)
             raise SystemExit(2) from None
+
+    def check(self, asked: schema.RunConfig) -> None:
+        """Raise InputError if the job cannot be done."""
+        from pipeline.parallel import Workers
+        from pipeline.run import state
+
+        state(asked)
+        Workers(address=asked.parallel.address).check()
 
     def on_multirun_start(self, config: DictConfig, **_: Any) -> None:
         self.sweep = uuid.uuid4().hex

@@ -26,6 +26,10 @@ from pipeline.session import checked
 from pipeline.task import PositionTask
 
 ROOT = Path(__file__).resolve().parents[1]
+RUN_FILES = {  # what every run leaves that has a confirmed motion
+    *("summary.csv", "summary.md", "trajectories.parquet", "recording.rrd", "run.json", "figures", ".hydra"),
+    *("motion.csv", "motion.json", "motion.yaml"),
+}
 sys.path.insert(0, str(ROOT / "tests" / "benchmarks"))
 from peer import PlanarArm  # noqa: E402
 

@@ -12,10 +12,13 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.image import imread
+from scipy.spatial import ConvexHull
 
 from pipeline.arrays import Array
-from pipeline.artifacts import figures, style
+from pipeline.artifacts import figures, solids, style
+from pipeline.clearance import Obstacles
 from pipeline.evaluation import Evaluation, evaluate
+from pipeline.geometry import Shape, capsule
 from pipeline.path import Line, RaisedCosine, Reference, direction_vector
 from pipeline.problem import Problem, Solution, Status, Trajectory
 from pipeline.task import PositionTask
@@ -235,3 +238,30 @@ def test_nothing_is_left_behind_by_a_failure(case: Case, tmp_path: Path, monkeyp
         figures.write(tmp_path, problem, motions, name="run")
     assert [file.name for file in tmp_path.iterdir()] == ["reference.png"]
     assert (tmp_path / "reference.png").read_bytes() == b"of an earlier run"
+
+
+SOLIDS = [
+    Shape("ball", "sphere", (0.05,), (0.3, 0.2, 0.1)),
+    Shape("box", "box", (0.1, 0.2, 0.3), (0.3, 0.2, 0.1), (0.3, -0.2, 0.5)),
+    capsule("rod", np.array([0.1, 0.2, 0.0]), np.array([0.3, 0.2, 0.4]), 0.03),
+]
+
+
+@pytest.mark.parametrize(("solid", "volume"), [*zip(SOLIDS, [5.236e-4, 6e-3, 1.3776e-3], strict=True)])
+def test_an_obstacle_is_as_large_as_it_is(solid: Shape, volume: float) -> None:
+    hull = ConvexHull(solids.surface(solid))
+    assert hull.volume == pytest.approx(volume, rel=0.05)
+    np.testing.assert_allclose((hull.min_bound + hull.max_bound) / 2, solid.position, atol=1e-3)
+
+
+def test_obstacles_are_drawn(case: Case) -> None:
+    """A planar motion shows their outlines, one in space the solids."""
+    problem, motions = case
+    among = replace(problem, obstacles=Obstacles(tuple(SOLIDS), 0.02))
+    flat = figures.stroboscopic(among, motions[:1], "run")
+    assert len(flat.axes[0].patches) == len(SOLIDS)
+    assert "Obstacle" in texts(flat)
+    assert "Obstacle" not in texts(figures.stroboscopic(problem, motions[:1], "run"))
+    lifted = replace(motions[0], skeleton=motions[0].skeleton + 0.1 * np.arange(4)[:, None] * np.eye(3)[2])
+    space = figures.stroboscopic(among, [lifted], "run")
+    assert len(space.axes[0].collections) == len(SOLIDS)

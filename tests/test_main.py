@@ -33,7 +33,12 @@ class Answer:
 Run = Callable[..., Answer]
 
 
-def call(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], *words: str) -> Answer:
+def call(
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+    *words: str,
+    entry: Callable[[], int] = __main__.main,
+) -> Answer:
     """The command line within this process: no imports to wait for."""
     monkeypatch.setenv("HYDRA_FULL_ERROR", "0")  # main() sets it; this puts it back
     monkeypatch.setattr(session, "exit_code", 0)
@@ -41,7 +46,7 @@ def call(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], *wo
     GlobalHydra.instance().clear()
     capfd.readouterr()
     try:
-        code = __main__.main()
+        code = entry()
     except SystemExit as leaving:
         code = int(leaving.code or 0)
     finally:
@@ -225,6 +230,13 @@ def robot(joints: int, inertia: str) -> str:
 SOLID = '<inertial><mass value="1"/><inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial>'
 ROBOTS = {
     "no inertia": (robot(3, ""), 3, ["inertia"]),
+    "unphysical inertia": (robot(3, SOLID.replace('izz="0.1"', 'izz="0.5"')), 3, ["l0", "inertia that no body has"]),
+    "a floating joint": (robot(3, SOLID).replace("revolute", "floating", 1), 3, ["j0", "floating", "revolute"]),
+    "a mimicking joint": (
+        robot(3, SOLID).replace("</joint>", '<mimic joint="j1"/></joint>', 1),
+        3,
+        ["j0", "mimics", "robot.locked.j0"],
+    ),
     "two joints for two coordinates": (robot(2, SOLID), 2, ["robot.task", "2 joints", "redundancy"]),
     "not xml": ("<robot", 3, ["arm.urdf"]),
     "another document": ("<sdf/>", 3, ["arm.urdf"]),
@@ -313,3 +325,18 @@ def test_bad_input_as_a_process(tmp_path: Path) -> None:
     assert_refused(answer, "path.lenght", "did you mean length")
     assert answer.out == ""
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_bad_robot_as_a_process(tmp_path: Path) -> None:
+    """Neither Drake nor Hydra adds a line of its own."""
+    file = tmp_path / "arm.sdf"
+    links = [f'<link name="l{i}"><pose>0.{2 * i} 0 0 0 0 0</pose>{{}}</link>' for i in range(4)]
+    bad = "<inertial><mass>1</mass><inertia><ixx>0.1</ixx><iyy>0.1</iyy><izz>0.5</izz></inertia></inertial>"
+    joint = '<joint name="j{0}" type="revolute"><parent>l{0}</parent><child>l{1}</child><axis><xyz>0 0 1</xyz></axis></joint>'
+    joints = [joint.format(i, i + 1) for i in range(3)]
+    model = "".join([*(link.format(bad) for link in links), *joints])
+    file.write_text(f'<sdf version="1.9"><model name="arm">{model}</model></sdf>', encoding="utf-8")
+    answer = command(f"robot.urdf={file}", "robot.end_effector=l3", "robot.q_init=[0.1,0.2,0.3]", folder=tmp_path)
+    assert_refused(answer, "robot.urdf", "link 'l1'", "inertia that no body has")
+    assert answer.out == ""
+    assert [file.name for file in tmp_path.iterdir()] == ["arm.sdf"]

@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from conftest import RUN_FILES
 
 from pipeline import config
 from pipeline.methods import global_planner
@@ -224,9 +225,7 @@ def test_a_killed_run_goes_on(tmp_path: Path) -> None:
 
     assert begin(killed).wait(timeout=120) == 0
     assert not (killed / UNFINISHED).exists()
-    assert {file.name for file in killed.iterdir()} == {
-        *("summary.csv", "summary.md", "trajectories.parquet", "recording.rrd", "run.json", "figures", ".hydra")
-    }
+    assert {file.name for file in killed.iterdir()} == RUN_FILES
     # The same as without the interruption.
     options = {"configurations": 8, "candidates": 100, "optimised": 10}
     undisturbed = config.check({**SIM1, "method": {"global": options}})

@@ -9,20 +9,21 @@ from pathlib import Path
 import pytest
 from hydra import compose, initialize_config_dir
 
-from pipeline import run, session
+from pipeline import inspect, run, session
 from pipeline.__main__ import CONF
 
 ROOT = Path(__file__).resolve().parent.parent
 TEXTS = {name: (ROOT / name).read_text(encoding="utf-8") for name in ("README.md", "docs/errata.md")}
 COMMANDS = sorted(
-    {line.split("  ")[0] for text in TEXTS.values() for line in re.findall(r"python -m pipeline([^`\n]*)", text)}
+    {line.split("  ")[0] for text in TEXTS.values() for line in re.findall(r"python -m pipeline(?!\.)([^`\n]*)", text)}
 )
+INSPECTED = sorted(set(re.findall(r"python -m pipeline\.inspect([^`\n]*)", TEXTS["README.md"])))
 
 
 def _values(word: str) -> list[str]:
     """One override per value of a swept key."""
     key, _, value = word.partition("=")
-    return [f"{key}={one}" for one in value.split(",")] if not value.startswith("[") else [word]
+    return [f"{key}={one}" for one in value.split(",")] if not value.startswith(("[", "{")) else [word]
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -32,6 +33,18 @@ def test_commands_state_a_problem(command: str) -> None:
         overrides = [_values(word)[min(number, len(_values(word)) - 1)] for word in words]
         with initialize_config_dir(CONF, version_base="1.3"):
             run.prepare(session.checked(compose("config", overrides=overrides)))
+
+
+@pytest.mark.parametrize("command", INSPECTED)
+def test_arms_are_inspected(command: str) -> None:
+    with initialize_config_dir(CONF, version_base="1.3"):
+        asked = session.checked(compose("config", overrides=shlex.split(command)))
+    assert inspect.inspect(asked.robot, asked.gravity).reach > 0
+
+
+def test_every_module_that_is_called_is_checked() -> None:
+    called = {name for text in TEXTS.values() for name in re.findall(r"python -m (pipeline[\w.]*)", text)}
+    assert called == {"pipeline", "pipeline.inspect"}
 
 
 def test_python_example_runs(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:

@@ -23,8 +23,10 @@ from rerun.experimental import ViewerClient
 from pipeline import urdf
 from pipeline.arm import Arm
 from pipeline.artifacts import blueprint, recording, style
+from pipeline.clearance import Obstacles
 from pipeline.config import GlobalOptions, LsvOptions
 from pipeline.evaluation import Evaluation, evaluate
+from pipeline.geometry import Shape, capsule
 from pipeline.methods import global_planner, lsv
 from pipeline.path import Line, RaisedCosine, Reference, direction_vector
 from pipeline.problem import Problem
@@ -111,6 +113,23 @@ def test_the_pictures_and_facts_are_there(case: Case, tmp_path: Path) -> None:
     assert "absent" not in stored
     assert component(file, "/summary", "TextDocument:text") == ["# A line\n\nthe text"]
     assert component(file, "/__properties", "RecordingInfo:name") == ["line"]
+
+
+def test_obstacles_are_drawn(case: Case, tmp_path: Path) -> None:
+    """As solids, and in the view from above as outlines."""
+    solids = (
+        Shape("ball", "sphere", (0.05,), (0.3, 0.2, 0.1)),
+        Shape("box", "box", (0.1, 0.2, 0.3), (0.3, 0.2, 0.1)),
+        capsule("rod", np.array([0.1, 0.2, 0.0]), np.array([0.3, 0.2, 0.4]), 0.03),
+    )
+    problem, evaluations = case
+    file = tmp_path / "run.rrd"
+    write(file, dataclasses.replace(problem, obstacles=Obstacles(solids, 0.02)), evaluations)
+    for name in ("ball", "box", "rod"):
+        assert {f"/obstacles/{name}", f"/planar/obstacles/{name}"} <= entities(file)
+    (outline,) = component(file, "/planar/obstacles/box", "LineStrips2D:strips")
+    assert np.ptp(outline, axis=0) == pytest.approx([0.1, 0.2], abs=1e-6)
+    assert np.mean(outline[:-1], axis=0) == pytest.approx([0.3, -0.2], abs=1e-6)
 
 
 def test_the_drawn_arm_and_the_stick_figure_agree(case: Case, tmp_path: Path) -> None:

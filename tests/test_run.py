@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from conftest import RUN_FILES
 from hydra import compose, initialize_config_dir
 from test_main import ROOT, Answer, call, command
 
@@ -68,8 +69,7 @@ class TestTraj3:
 
     def test_every_file_of_the_contract(self, traj3: tuple[Answer, Path]) -> None:
         _, folder = traj3
-        names = {"summary.csv", "summary.md", "trajectories.parquet", "recording.rrd", "run.json", "figures", ".hydra"}
-        assert {file.name for file in folder.iterdir()} == names
+        assert {file.name for file in folder.iterdir()} == RUN_FILES
         pictures = {file.stem: file for file in (folder / "figures").iterdir()}
         assert set(FIGURES) <= set(pictures)
         for picture in pictures.values():
@@ -225,8 +225,7 @@ def test_a_failing_method_fails_the_run_and_leaves_everything(
     assert f"- **global**: {table['message']['global']}" in text
     assert "not converged" in answer.out
     assert str(table["message"]["global"]) in answer.out
-    names = {"summary.csv", "summary.md", "trajectories.parquet", "recording.rrd", "run.json", "figures", ".hydra"}
-    assert {file.name for file in folder.iterdir()} == names
+    assert {file.name for file in folder.iterdir()} == RUN_FILES
     assert set(FIGURES) <= {file.stem for file in (folder / "figures").iterdir()}
     facts = strict_json((folder / "run.json").read_text(encoding="utf-8"))
     assert [solved["status"] for solved in facts["solutions"]] == ["solved", "not converged"]

@@ -100,7 +100,7 @@ def _plane(labels: Sequence[str], points: Array, hidden: Sequence[str]) -> Any:
     margin = 0.08 * max(float((high - low).max()), 1e-6)
     return rrb.Spatial2DView(
         origin="/planar",
-        contents=["/planar/reference", *(f"/planar/{slug(label)}/**" for label in labels)],
+        contents=["/planar/reference", "/planar/obstacles/**", *(f"/planar/{slug(label)}/**" for label in labels)],
         name="Arms (plane)",
         overrides=_hide(hidden, "/planar"),
         background=BACKGROUND,

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
 from pipeline.arrays import Array
-from pipeline.artifacts import style
+from pipeline.artifacts import solids, style
 from pipeline.evaluation import Evaluation
 from pipeline.files import write_beside
 from pipeline.problem import Problem
@@ -92,6 +92,10 @@ def stroboscopic(problem: Problem, evaluations: Sequence[Evaluation], name: str)
     planar = size.min() < 1e-6 * size.max()
     dims = np.delete(np.arange(3), np.argmin(size)) if planar else np.arange(3)
     margin = 0.06 * size.max()
+    obstacles = problem.obstacles.shapes if problem.obstacles is not None else ()
+    for shape in obstacles:
+        corners = solids.surface(shape)
+        low, high = np.minimum(low, corners.min(axis=0)), np.maximum(high, corners.max(axis=0))
     low, high = low[dims] - margin, high[dims] + margin
     rows, columns = _shape(len(evaluations))
     width = 4.4 if columns < 4 else 3.4
@@ -104,6 +108,8 @@ def stroboscopic(problem: Problem, evaluations: Sequence[Evaluation], name: str)
     for i, e in enumerate(evaluations):
         axes: Any = figure.add_subplot(rows, columns, i + 1, projection=None if planar else "3d")
         panels.append(axes)
+        for shape in obstacles:
+            solids.draw(axes, shape, dims)
         path = problem.task.in_world(prescribed, e.position[0])[:, dims]
         axes.plot(*path.T, color=PATH, linewidth=5, alpha=0.25, solid_capstyle="round")
         event = e.solution.event_time
@@ -133,6 +139,8 @@ def stroboscopic(problem: Problem, evaluations: Sequence[Evaluation], name: str)
         Line2D([], [], color=PATH, linewidth=5, alpha=0.25, label="Prescribed path"),
         Line2D([], [], color=PATH, linewidth=1.4, label="End effector"),
     ]
+    if obstacles:
+        entries.append(Line2D([], [], marker="o", linestyle="", color=solids.COLOR, alpha=0.5, label="Obstacle"))
     if any(e.solution.event_time is not None for e in evaluations):
         ring = Line2D([], [], color=EVENT, marker="o", linestyle="", fillstyle="none", markersize=9)
         ring.set_label("Singularity; poses after it in grey")

@@ -38,9 +38,8 @@ def picture(description: Description) -> tuple[str, list[str]]:
     if not missing:
         return ET.tostring(root, encoding="unicode"), []
     count = f"{len(missing)} meshes" if len(missing) > 1 else "1 mesh"
-    note = (
-        f"{count} of {description.file.name} not found, drawn without them ({missing[0]}{', ...' * (len(missing) > 1)})"
-    )
+    named = missing[0] + ", ..." * (len(missing) > 1)
+    note = f"{count} of {description.file.name} not found, drawn without ({named})"
     return ET.tostring(root, encoding="unicode"), [note]
 
 

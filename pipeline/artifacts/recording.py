@@ -29,6 +29,7 @@ from pipeline.arrays import Array
 from pipeline.artifacts import blueprint, style
 from pipeline.artifacts.blueprint import faded, pixels, rgba, slug
 from pipeline.artifacts.picture import picture
+from pipeline.artifacts.solids import outline
 from pipeline.evaluation import Evaluation
 from pipeline.geometry import Shape
 from pipeline.problem import Problem, Status
@@ -70,7 +71,7 @@ def write(
                 recording.log("picture", rr.EncodedImage(path=front), static=True)
             _send_reference(recording, problem)
             if problem.obstacles is not None:
-                send_obstacles(recording, problem.obstacles.shapes)
+                send_obstacles(recording, problem.obstacles.shapes, _planar(problem))
             for evaluation in evaluations:
                 _send_series(recording, problem, evaluation)
                 _send_motion(recording, problem, evaluation)
@@ -305,9 +306,13 @@ def _note(text: str) -> None:
     _log.warning("note: %s", text)
 
 
-def send_obstacles(recording: Any, shapes: Sequence[Shape]) -> None:
-    """Solids that stand in the world."""
+def send_obstacles(recording: Any, shapes: Sequence[Shape], planar: bool) -> None:
+    """Solids that stand in the world, and for the view from above their outlines."""
     for shape in shapes:
+        if planar:
+            edge = _flat(outline(shape))
+            line = rr.LineStrips2D([[*edge, edge[0]]], colors=OBSTACLE, radii=pixels(2.0), draw_order=15.0)
+            recording.log(f"planar/obstacles/{slug(shape.name)}", line, static=True)
         common: dict[str, Any] = {"colors": [OBSTACLE], "fill_mode": "solid"}
         place = {"quaternions": [Rotation.from_rotvec(shape.rotation).as_quat()]}
         if shape.kind == "capsule":

@@ -210,6 +210,11 @@ def markdown(
         lines += markdown_table(_cells(extras.convergence))
     if extras.exported is not None:
         lines += ["", f"Exported: {resample.sentence(extras.exported)}."]
+    elif config.export.method == "best":
+        lines += [
+            "",
+            "Exported: nothing, since no confirmed motion keeps every limit (export.method names one anyway).",
+        ]
     if extras.closed_loop is not None:
         lines += ["", f"Closed loop: {extras.closed_loop.sentence}."]
     if extras.study is not None:
