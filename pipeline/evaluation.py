@@ -6,6 +6,7 @@ so that a mistake in the stacked evaluations or their scaling cannot hide.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,7 +19,9 @@ from scipy.spatial.transform import Rotation
 
 from pipeline.arm import Arm
 from pipeline.arrays import Array
+from pipeline.base_motion import Floating, integrate, reactions
 from pipeline.clearance import Clearance
+from pipeline.floating import FloatingArm
 from pipeline.problem import Boundary, Problem, Solution, Status, Trajectory
 from pipeline.task import PositionTask, Task
 
@@ -28,8 +31,24 @@ BETWEEN = 10  # sub-intervals per knot interval on which the motion between knot
 
 
 @dataclass(frozen=True)
+class Base:
+    """The base: position (N + 1, 3) [m], rotation (N + 1, 3, 3) and turn from the start (N + 1,) [rad] at the knots.
+
+    reaction (N + 1, 6) [N, N m]: what holds a base that stands still; None if it floats. integrals, running (N + 1,):
+    base_rotation, reaction_force, reaction_torque. floating: the motion that the joints alone give; None if it stands.
+    """
+
+    position: Array
+    rotation: Array
+    turn: Array
+    reaction: Array | None
+    integrals: dict[str, Array]
+    floating: Floating | None
+
+
+@dataclass(frozen=True)
 class Evaluation:
-    """One motion and all that is known of it. Shapes: N + 1 knots, n joints; SI units.
+    """One motion and all that is known of it. Shapes: N + 1 knots, n joints; SI units. What the base does is in `base`.
 
     Velocities, accelerations and torques are backward differences at the knots (Global paper Section 4): the sum
     1/2 qd_i' M(q_i) qd_i dt_i is the kinetic-energy integral that the documents print.
@@ -64,6 +83,7 @@ class Evaluation:
     clearance_between: float  # smallest along that spline
     limit_excess: dict[str, float]  # by kind, at the knots, relative; see limit_excess()
     limit_excess_between: dict[str, float]  # the same along that spline
+    base: Base
 
     @property
     def method(self) -> str:
@@ -73,6 +93,11 @@ class Evaluation:
     def label(self) -> str:
         """`global`, `global 2`, ...: the method and, from the second on, its optimum."""
         return self.method if self.solution.optimum == 1 else f"{self.method} {self.solution.optimum}"
+
+    def integral(self, name: str) -> float:
+        """One of problem.INTEGRALS at the end of the motion."""
+        own = {"kinetic_energy": self.energy_integral, "torque": self.torque_integral}
+        return float((own[name] if name in own else self.base.integrals[name])[-1])
 
     @property
     def confirmed(self) -> bool:
@@ -87,34 +112,42 @@ def evaluate(problem: Problem, solution: Solution) -> Evaluation:
     dt = np.diff(time)
     qd, qdd = differences(trajectory, problem.boundary, problem.reference.timing.at_rest)
     plant = _Plant(arm)
+    if arm.floats and problem.boundary is Boundary.CYCLIC:
+        qd, qdd = _entered(plant, trajectory, qd)
     count, n = q.shape
     tau, energy, radius = np.full((count, n), np.nan), np.full(count, np.nan), np.full(count, np.nan)
-    skeleton, singular = np.full((count, n + 1, 3), np.nan), np.full(count, np.nan)
+    skeleton, singular = np.full((count, n - arm.base_coordinates + 1, 3), np.nan), np.full(count, np.nan)
+    place, way = np.full((count, 3), np.nan), np.full((count, 3, 3), np.nan)
     tracking, turned, targets = np.full(count, np.nan), np.full(count, np.nan), problem.reference.position(time)
     for i in np.flatnonzero(np.isfinite(np.hstack([q, qd, qdd])).all(axis=1)):  # Drake refuses other values
         plant.at(q[i], qd[i])
         energy[i] = plant.kinetic_energy()
         tau[i] = plant.torque(qdd[i])
-        radius[i] = np.linalg.eigvalsh(plant.mass_matrix())[-1]
-        skeleton[i] = plant.skeleton()
-        singular[i] = np.linalg.svd(plant.task_jacobian(task), compute_uv=False)[-1]
+        spread = plant.motion_map()
+        radius[i] = np.linalg.eigvalsh(spread.T @ plant.mass_matrix() @ spread)[-1]
+        skeleton[i], (place[i], way[i]) = plant.skeleton(), plant.base()
+        singular[i] = np.linalg.svd(plant.task_jacobian(task) @ spread, compute_uv=False)[-1]
         tracking[i], turned[i] = plant.task_error(task, targets[i])
     # At the first knot nothing has been spent yet: the interval's values stand at its end.
     tau[0] = tau[0] if problem.boundary is Boundary.CYCLIC else 0.0
     position = skeleton[:, -1]
     scene = None if problem.obstacles is None else Clearance(arm, problem.obstacles)
     clearance = _clearance(scene, q)
-    excess = limit_excess(problem, q, qd, tau, float(clearance.min()))
+    turn = _angle(plant.start, way)
+    excess = limit_excess(problem, q, qd, tau, float(clearance.min()), float(turn.max()))
     spline_integral, spline_objective, between, turned_between, clear_between, excess_between = _between_knots(
         problem, plant, scene, trajectory, qd[0]
     )
     secondary = np.array([plant.secondary(problem, qi) for qi in q]) if problem.objective.secondary else np.zeros(count)
+    moving = q
+    q, qd, qdd, tau = (values[:, arm.base_coordinates :] for values in (q, qd, qdd, tau))
+    base = _base(problem, solution, place, way, turn, (q, qd, qdd))
     energy_integral, torque_integral = _running(energy, dt), _running((tau**2).sum(axis=1), dt)
     velocity_norm_integral = _running((qd**2).sum(axis=1), dt)
 
     status, message = solution.status, solution.message
     if status is Status.SOLVED:
-        status, message = _judge(q, tracking, turned, excess, solution)
+        status, message = _judge(moving, tracking, turned, excess, solution)
     return Evaluation(
         solution=solution,
         status=status,
@@ -140,6 +173,7 @@ def evaluate(problem: Problem, solution: Solution) -> Evaluation:
             float(torque_integral[-1]),
             float(velocity_norm_integral[-1]),
             float(np.trapezoid(secondary, time)),
+            {name: float(running[-1]) for name, running in base.integrals.items()},
         ),
         objective_spline=spline_objective,
         singular_value=singular,
@@ -151,7 +185,45 @@ def evaluate(problem: Problem, solution: Solution) -> Evaluation:
         clearance_between=clear_between,
         limit_excess=excess,
         limit_excess_between=excess_between,
+        base=base,
     )
+
+
+def _base(
+    problem: Problem, solution: Solution, place: Array, way: Array, turn: Array, joints: tuple[Array, Array, Array]
+) -> Base:
+    """What the base does: pose at the knots, from the solution; the rest from the joint motion alone (`base_motion.py`)."""
+    arm, time = problem.task.arm, solution.trajectory.time
+    dt, nothing = np.diff(time), np.zeros(len(time))
+    if not isinstance(arm, FloatingArm) or not arm.floats:
+        reaction = reactions(arm, *joints)
+        reaction[0] = reaction[0] if problem.boundary is Boundary.CYCLIC else 0.0
+        force, torque = ((reaction[:, part] ** 2).sum(axis=1) for part in (slice(3), slice(3, 6)))
+        integrals = {"reaction_force": _running(force, dt), "reaction_torque": _running(torque, dt)}
+        return Base(place, way, turn, reaction, {"base_rotation": nothing, **integrals}, None)
+    steps = way[1:] @ way[:-1].swapaxes(1, 2)
+    rate = np.concatenate([[0.0], _angle(np.eye(3), steps) / dt])
+    integrals = {"base_rotation": _running(rate**2, dt), "reaction_force": nothing, "reaction_torque": nothing}
+    finite = np.isfinite(joints[0]).all() and len(time) >= 4 and solution.found
+    floating = integrate(problem, arm, time, joints[0]) if finite else None
+    return Base(place, way, turn, None, integrals, floating)
+
+
+def _angle(start: Array, rotation: Array) -> Array:
+    """The angle (K,) [rad] between rotations (K, 3, 3) and one of them."""
+    chord = np.linalg.norm(rotation - start, axis=(1, 2)) / np.sqrt(8)
+    return np.asarray(2 * np.arcsin(np.minimum(chord, 1.0)))
+
+
+def _entered(plant: _Plant, trajectory: Trajectory, qd: Array) -> tuple[Array, Array]:
+    """Velocities and accelerations of a cycle on a floating base: it is entered with the joints' last velocity, and the
+    base's that goes with it at the start.
+    """
+    qd = qd.copy()
+    plant.at(trajectory.q[0], qd[0])
+    qd[0] = plant.motion_map() @ qd[0, plant.nb :] + plant.drift()
+    change = np.diff(qd, axis=0) / np.diff(trajectory.time)[:, None]
+    return qd, np.vstack([change[-1], change])
 
 
 def differences(trajectory: Trajectory, boundary: Boundary, at_rest: bool) -> tuple[Array, Array]:
@@ -170,7 +242,9 @@ def differences(trajectory: Trajectory, boundary: Boundary, at_rest: bool) -> tu
     return qd, np.vstack([change[-1] if boundary is Boundary.CYCLIC else np.zeros_like(first), change])
 
 
-def _weighted(problem: Problem, energy: float, torque: float, norm: float, secondary: float) -> float:
+def _weighted(
+    problem: Problem, energy: float, torque: float, norm: float, secondary: float, base: Mapping[str, float]
+) -> float:
     """The objective from its integrals; a term without weight does not count, even where it is not known."""
     weights = problem.objective
     k0 = weights.secondary.k0 if weights.secondary else 0.0
@@ -179,6 +253,7 @@ def _weighted(problem: Problem, energy: float, torque: float, norm: float, secon
         (weights.torque, torque),
         (weights.velocity_norm, norm),
         (-k0, secondary),
+        *((getattr(weights, name), value) for name, value in base.items()),
     )
     return sum(weight * term for weight, term in terms if weight)
 
@@ -214,7 +289,7 @@ def _between_knots(
     if not np.all(np.isfinite(trajectory.q)) or len(trajectory.time) < 4:
         return float("nan"), float("nan"), float("nan"), float("nan"), float("nan"), {}
     # Only torques tie the first velocity to rest; the energy's sum lets it jump, and nothing prescribes the last one.
-    torque_counts = problem.objective.torque > 0 or bool(np.isfinite(problem.bounds.torque).any())
+    torque_counts = problem.objective.second_order or bool(np.isfinite(problem.bounds.torque).any())
     rest = problem.reference.timing.at_rest and problem.boundary is not Boundary.CYCLIC and torque_counts
     ends = ((1, qd_start), "not-a-knot") if rest else "not-a-knot"
     spline = CubicSpline(trajectory.time, trajectory.q, bc_type=ends)
@@ -223,22 +298,26 @@ def _between_knots(
     dt = np.diff(trajectory.time)
     moments = (trajectory.time[:-1, None] + dt[:, None] * fraction).ravel()
     q, qd, qdd, x_ref = spline(moments), spline(moments, 1), spline(moments, 2), problem.reference.position(moments)
-    energy, error, turned, secondary = np.zeros((4, len(moments)))
-    tau = np.zeros_like(q)
+    energy, error, turned, secondary, turn = np.zeros((5, len(moments)))
+    tau, nb = np.zeros_like(q), plant.nb
+    spinning = np.zeros(len(moments))
     for i in range(len(moments)):
         plant.at(q[i], qd[i])
         energy[i] = plant.kinetic_energy()
         error[i], turned[i] = plant.task_error(problem.task, x_ref[i])
+        turn[i] = _angle(plant.start, plant.base()[1][None])[0]
+        spinning[i] = plant.spin_squared()
         if problem.bounds.any:
             tau[i] = plant.torque(qdd[i])
         if problem.objective.secondary:
             secondary[i] = plant.secondary(problem, q[i])
-    integral, norm, gain = (
-        float(rate.reshape(len(dt), -1) @ weights @ dt) for rate in (energy, (qd**2).sum(axis=1), secondary)
-    )
-    objective = _weighted(problem, integral, float("nan"), norm, gain)
+    rates = (energy, (qd[:, nb:] ** 2).sum(axis=1), secondary, spinning)
+    integral, norm, gain, spun = (float(rate.reshape(len(dt), -1) @ weights @ dt) for rate in rates)
+    unknown = float("nan")
+    of_base = {"base_rotation": spun, "reaction_force": unknown, "reaction_torque": unknown}
+    objective = _weighted(problem, integral, unknown, norm, gain, of_base)
     clear = float(_clearance(scene, q[:: BETWEEN // CLEARANCES]).min())
-    excess = limit_excess(problem, q, qd, tau, clear)
+    excess = limit_excess(problem, q, qd, tau, clear, float(turn.max()))
     return integral, objective, float(error.max()), float(turned.max()), clear, excess
 
 
@@ -251,15 +330,19 @@ def _clearance(scene: Clearance | None, q: Array) -> Array:
     return clearance
 
 
-def limit_excess(problem: Problem, q: Array, qd: Array, tau: Array, clearance: float = np.inf) -> dict[str, float]:
+def limit_excess(
+    problem: Problem, q: Array, qd: Array, tau: Array, clearance: float = np.inf, turn: float = 0.0
+) -> dict[str, float]:
     """By how much each kind of limit is exceeded, relative to its size (positions: to half the range; clearances: to the
-    margin); <= 0 if kept.
+    margin); <= 0 if kept. turn [rad]: of the base from its start.
     """
     if not problem.constrained or not np.all(np.isfinite(q)):
         return {}
     found = {kind: float(excess.max()) for kind, excess in _excesses(problem, q, qd, tau).items()}
     if problem.obstacles is not None:
         found["clearance"] = 1 - clearance / problem.obstacles.margin
+    if np.isfinite(problem.bounds.attitude):
+        found["attitude"] = turn / problem.bounds.attitude - 1
     return found
 
 
@@ -289,11 +372,12 @@ class Audit:
 def audit(problem: Problem, time: Array, q: Array, qd: Array, qdd: Array) -> Audit:
     """Judge samples (K, n) that come with their own velocities and accelerations, at times (K,)."""
     plant, targets = _Plant(problem.task.arm), problem.reference.position(time)
-    error, turned, tau = np.empty(len(time)), np.empty(len(time)), np.empty_like(q)
+    error, turned, turn, tau = np.empty(len(time)), np.empty(len(time)), np.empty(len(time)), np.empty_like(q)
     for i in range(len(time)):
         plant.at(q[i], qd[i])
         error[i], turned[i] = plant.task_error(problem.task, targets[i])
         tau[i] = plant.torque(qdd[i])
+        turn[i] = _angle(plant.start, plant.base()[1][None])[0]
     scene = None if problem.obstacles is None else Clearance(problem.task.arm, problem.obstacles)
     clearance = _clearance(scene, q)
     worst = {
@@ -302,7 +386,9 @@ def audit(problem: Problem, time: Array, q: Array, qd: Array, qdd: Array) -> Aud
     }
     if scene is not None:
         worst["clearance"] = (int(np.argmin(clearance)), 0)
-    excess = limit_excess(problem, q, qd, tau, float(clearance.min()))
+    if np.isfinite(problem.bounds.attitude):
+        worst["attitude"] = (int(np.argmax(turn)), 0)
+    excess = limit_excess(problem, q, qd, tau, float(clearance.min()), float(turn.max()))
     return Audit(float(error.max()), float(turned.max()), excess, worst)  # type: ignore[arg-type]
 
 
@@ -313,7 +399,8 @@ class _Plant:
         xml, root = arm.description.for_drake
         plant = self.plant = MultibodyPlant(0.0)
         (model,) = Parser(plant).AddModelsFromString(xml, "urdf")
-        stand = RigidTransform(RotationMatrix(Rotation.from_euler("xyz", arm.base_rpy).as_matrix()), arm.base_position)
+        self.start = Rotation.from_euler("xyz", arm.base_rpy).as_matrix()
+        stand = RigidTransform(RotationMatrix(self.start), arm.base_position)
         plant.WeldFrames(plant.world_frame(), plant.GetFrameByName(root, model), stand)
         link = plant.GetFrameByName(arm.description.end_effector, model)
         tool = RigidTransform(RotationMatrix(Rotation.from_euler("xyz", arm.offset_rpy).as_matrix()), arm.offset)
@@ -328,6 +415,8 @@ class _Plant:
             plant.WeldFrames(self.end, ball.body_frame())
         plant.Finalize()
         self.order = np.array([joint.position_start() for joint in self.joints])
+        self.arm, self.nb = arm, arm.base_coordinates
+        self.root = plant.GetBodyByName(arm.description.drake_name(arm.description.base), model)
         self.context = plant.CreateDefaultContext()
         self.forces = MultibodyForces(plant)
 
@@ -355,8 +444,32 @@ class _Plant:
 
     def skeleton(self) -> Array:
         return np.array(
-            [joint.frame_on_child().CalcPoseInWorld(self.context).translation() for joint in self.joints] + [self.tip()]
+            [joint.frame_on_child().CalcPoseInWorld(self.context).translation() for joint in self.joints[self.nb :]]
+            + [self.tip()]
         )
+
+    def base(self) -> tuple[Array, Array]:
+        """Position (3,) and rotation matrix (3, 3) of the root link."""
+        pose = self.root.EvalPoseInWorld(self.context)
+        return np.asarray(pose.translation()), np.asarray(pose.rotation().matrix())
+
+    def spin_squared(self) -> float:
+        """Of the root link's angular velocity [rad^2/s^2]."""
+        return float((self.root.EvalSpatialVelocityInWorld(self.context).rotational() ** 2).sum())
+
+    def motion_map(self) -> Array:
+        """All velocities by the joints' (N, n): B of `floating.py`."""
+        n, nb = len(self.order), self.nb
+        out = np.vstack([np.zeros((nb, n - nb)), np.eye(n - nb)])
+        if self.arm.floats:
+            inertia = self.mass_matrix()
+            out[:nb] = -np.linalg.solve(inertia[:nb, :nb], inertia[:nb, nb:])
+        return out
+
+    def drift(self) -> Array:
+        """The velocities (N,) of a floating base whose system has momentum, its joints at rest."""
+        q = np.asarray(self.plant.GetPositions(self.context))[self.order]
+        return self.arm.follow(q[None], np.zeros((1, len(q))))[0]
 
     def secondary(self, problem: Problem, q: Array) -> float:
         """w at q (n,): Pontryagin report eqs (14), (15), the latter with its square."""

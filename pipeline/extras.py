@@ -77,5 +77,5 @@ def _study(problem: Problem, config: RunConfig, evaluations: Sequence[Evaluation
     found = [e for e in evaluations if e.method == "global" and e.confirmed]
     if not found:
         return None
-    optimum = float(objective_values(problem, problem.times, found[0].q[None])[0])
+    optimum = float(objective_values(problem, problem.times, found[0].solution.trajectory.q[None])[0])
     return candidate_study.study(problem, optimum, config.method.global_, config.candidate_study, config.seed)

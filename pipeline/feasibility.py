@@ -9,8 +9,8 @@ import numpy as np
 from pipeline.arm import Arm
 from pipeline.arrays import Array
 from pipeline.clearance import Clearance, Obstacles
-from pipeline.floating import FloatingArm
 from pipeline.costs import integrals, velocities
+from pipeline.floating import FloatingArm
 from pipeline.problem import Problem
 from pipeline.transcription import Transcription
 

@@ -24,10 +24,8 @@ def table(evaluations: Sequence[Evaluation]) -> pd.DataFrame | None:
         return None
     statistics = front[0].solution.statistics
     rows = pd.DataFrame(statistics["front"])
-    costs = {
-        e.solution.optimum: {"kinetic_energy": e.energy_integral[-1], "torque": e.torque_integral[-1]} for e in front
-    }
     names = statistics["objectives"]
+    costs = {e.solution.optimum: {name: e.integral(name) for name in names} for e in front}
     for name in names:
         rows[name] = [costs[point][name] if point in costs else np.nan for point in rows["point"]]
     bounded = [row[row["bounded"]] / row["bound"] - 1 if row["bounded"] else np.nan for row in rows.to_dict("records")]

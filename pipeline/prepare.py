@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from pipeline import config as schema
 from pipeline import base, packages, urdf
+from pipeline import config as schema
 from pipeline.arm import Arm
 from pipeline.arrays import Array
 from pipeline.clearance import Clearance, Obstacles

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -50,16 +51,25 @@ def curve(problem: Problem, time: Array, q: Array) -> CubicSpline:
     return CubicSpline(time, q, bc_type="clamped" if problem.reference.timing.at_rest else "not-a-knot")
 
 
+def _whole(problem: Problem, evaluation: Evaluation) -> Callable[..., Array]:
+    """The same curve with a moving base's coordinates before the joints'."""
+    nb, joints = problem.task.arm.base_coordinates, curve(problem, evaluation.time, evaluation.q)
+    if not nb:
+        return joints
+    base = CubicSpline(evaluation.time, evaluation.solution.trajectory.q[:, :nb])
+    return lambda time, order=0: np.hstack([base(time, order), joints(time, order)])
+
+
 def resample(problem: Problem, evaluation: Evaluation, rate: float) -> Resampled:
     """The motion at `rate` [Hz], its last sample at exactly T."""
-    spline = curve(problem, evaluation.time, evaluation.q)
+    spline, everything = curve(problem, evaluation.time, evaluation.q), _whole(problem, evaluation)
     duration = float(evaluation.time[-1])
     time = np.append(np.arange(0.0, duration - 1e-9, 1.0 / rate), duration)
     q, qd, qdd = spline(time), spline(time, 1), spline(time, 2)
     knots = evaluation.time
     fine = np.interp(np.arange(BETWEEN * (len(knots) - 1) + 1) / BETWEEN, np.arange(len(knots)), knots)
     judged = np.union1d(time, fine)  # a slow rate must not hide what happens between its samples
-    checked = audit(problem, judged, spline(judged), spline(judged, 1), spline(judged, 2))
+    checked = audit(problem, judged, everything(judged), everything(judged, 1), everything(judged, 2))
     names = problem.task.arm.description.joints
     worst = {kind: (float(judged[row]), names[joint]) for kind, (row, joint) in checked.worst.items()}
     return Resampled(

@@ -81,7 +81,16 @@ def solve(
 
 def run_and_write(config: schema.RunConfig, folder: File) -> int:
     """One whole run into `folder`; returns the exit code."""
-    from pipeline.artifacts import closed_loop_figure, export, figures, front_figure, recording, study_figure, tables
+    from pipeline.artifacts import (
+        base_figure,
+        closed_loop_figure,
+        export,
+        figures,
+        front_figure,
+        recording,
+        study_figure,
+        tables,
+    )
     from pipeline.console import Console
 
     stages: dict[str, float] = {}
@@ -116,10 +125,12 @@ def run_and_write(config: schema.RunConfig, folder: File) -> int:
     tables.write(folder, evaluations, summary, markdown, extra)
     if extra.exported is not None:
         arm = problem.task.arm.description
-        export.write(folder, extra.exported, arm.joints, arm.base)
+        export.write(folder, extra.exported, arm.actuated, arm.base)
     timed("tables", begin)
     begin = time.perf_counter()
     figures.write(folder / "figures", problem, extra.shown(evaluations), name=config.name)
+    if problem.task.arm.base_coordinates:
+        base_figure.write(folder / "figures", problem, extra.shown(evaluations), name=config.name)
     if extra.closed_loop is not None:
         closed_loop_figure.write(folder / "figures", extra.closed_loop, problem, name=config.name)
     if extra.study is not None:

@@ -24,6 +24,7 @@ CHECKS = {
     "singular_value": "Smallest singular value",
     "spectral_radius": "Spectral radius of M",
 }
+FLOATING = {"base_turn": "Turn of the base [rad]"}  # first of the checks where the base floats
 
 
 def slug(label: str) -> str:
@@ -38,6 +39,7 @@ def build(
     planar: bool,
     ranges: Mapping[str, tuple[float, float]],
     picture: bool = False,
+    floats: bool = False,
 ) -> rrb.Blueprint:
     """The layout for the motions `labels`; the cameras take in `points` (P, 3) [m], all of the scene.
 
@@ -54,9 +56,11 @@ def build(
     if picture:
         summary = rrb.Tabs(rrb.Spatial2DView(origin="/picture", name="Front"), summary)
     compared = {
-        entity: _compare(labels, entity, title, ranges.get(entity)) for entity, title in (ENERGIES | CHECKS).items()
+        entity: _compare(labels, entity, title, ranges.get(entity))
+        for entity, title in (ENERGIES | CHECKS | FLOATING).items()
     }
-    checks = rrb.Tabs(*[compared[entity] for entity in CHECKS], name="Checks")
+    checked = (FLOATING if floats else {}) | CHECKS
+    checks = rrb.Tabs(*[compared[entity] for entity in checked], name="Checks")
     joints = rrb.Tabs(*[_joints(label, revolute) for label in labels], name="Joints")
     return rrb.Blueprint(
         rrb.Horizontal(

@@ -26,8 +26,10 @@ from scipy.ndimage import median_filter
 
 from pipeline.arrays import Array
 from pipeline.artifacts import solids, style
+from pipeline.artifacts.spacecraft import outlines
 from pipeline.evaluation import Evaluation
 from pipeline.files import write_beside
+from pipeline.floating import FloatingArm
 from pipeline.problem import Problem
 from pipeline.task import AXES
 
@@ -87,6 +89,9 @@ def energy(problem: Problem, evaluations: Sequence[Evaluation], name: str) -> Fi
 def stroboscopic(problem: Problem, evaluations: Sequence[Evaluation], name: str) -> Figure:
     """The arm in poses equally spaced in time (Figs 4-7 and 9-12, top): in its plane, or in space."""
     points = np.concatenate([e.skeleton.reshape(-1, 3) for e in evaluations])
+    arm = problem.task.arm
+    edges = [outlines(arm, e.base) for e in evaluations] if isinstance(arm, FloatingArm) and arm.floats else []
+    points = np.concatenate([points, *(edge.reshape(-1, 3) for edge in edges)])
     low, high = np.nanmin(points, axis=0), np.nanmax(points, axis=0)
     size = high - low
     planar = size.min() < 1e-6 * size.max()
@@ -117,6 +122,8 @@ def stroboscopic(problem: Problem, evaluations: Sequence[Evaluation], name: str)
             usable = event is None or e.time[k] <= event
             shade = to_hex(TIME_RAMP(clock(e.time[k]))) if usable else PALE
             axes.plot(*e.skeleton[k][:, dims].T, "o-", color=shade, linewidth=1.7, markersize=2.8, zorder=2 + usable)
+            for edge in edges[i : i + 1]:
+                axes.plot(*edge[k][:, dims].T, color=shade, linewidth=1.2, zorder=1.5 + usable)
         axes.plot(*e.position[_thin(e.time)][:, dims].T, color=PATH, linewidth=1.4, zorder=4)
         axes.plot(*e.skeleton[0, :1, dims], "s", color=INK, markersize=8, zorder=5)
         if event is not None:

@@ -30,7 +30,9 @@ from pipeline.artifacts import blueprint, style
 from pipeline.artifacts.blueprint import faded, pixels, rgba, slug
 from pipeline.artifacts.picture import picture
 from pipeline.artifacts.solids import outline
+from pipeline.artifacts.spacecraft import box, outlines
 from pipeline.evaluation import Evaluation
+from pipeline.floating import FloatingArm
 from pipeline.geometry import Shape
 from pipeline.problem import Problem, Status
 
@@ -111,9 +113,15 @@ def _layout(problem: Problem, evaluations: Sequence[Evaluation], front: bool) ->
     if problem.obstacles is not None:
         points.append(np.array([shape.position for shape in problem.obstacles.shapes]))
     points += [evaluation.skeleton[_finite(evaluation)].reshape(-1, 3) for evaluation in evaluations]
+    arm = problem.task.arm
+    floats = isinstance(arm, FloatingArm) and arm.floats
+    if isinstance(arm, FloatingArm) and floats:
+        points += [outlines(arm, e.base)[_finite(e)].reshape(-1, 3) for e in evaluations]
     labels = [evaluation.label for evaluation in evaluations]
     revolute = problem.task.arm.description.revolute.tolist()
-    return blueprint.build(labels, np.concatenate(points), revolute, _planar(problem), _ranges(evaluations), front)
+    return blueprint.build(
+        labels, np.concatenate(points), revolute, _planar(problem), _ranges(evaluations), front, floats
+    )
 
 
 def _ranges(evaluations: Sequence[Evaluation]) -> dict[str, tuple[float, float]]:
@@ -183,7 +191,7 @@ def _send_reference(recording: Any, problem: Problem) -> None:
 
 def _send_series(recording: Any, problem: Problem, evaluation: Evaluation) -> None:
     time, label, root = columns(evaluation.time), evaluation.label, slug(evaluation.label)
-    joints = list(problem.task.arm.description.joints)
+    joints = list(problem.task.arm.description.actuated)
     colors = [style.joint_color(j) for j in range(len(joints))]
     vectors = {"joint_position": evaluation.q, "joint_velocity": evaluation.qd, "joint_torque": evaluation.tau}
     scalars = {
@@ -193,6 +201,8 @@ def _send_series(recording: Any, problem: Problem, evaluation: Evaluation) -> No
         "singular_value": evaluation.singular_value,
         "spectral_radius": evaluation.spectral_radius,
     }
+    if evaluation.base.reaction is None:
+        scalars["base_turn"] = evaluation.base.turn
     for entity, values in vectors.items():
         lines = rr.SeriesLines(names=joints, colors=[_channels(color) for color in colors], widths=2.0)
         recording.log(f"{root}/{entity}", lines, static=True)
@@ -223,6 +233,12 @@ def _send_motion(recording: Any, problem: Problem, evaluation: Evaluation) -> No
         chosen = np.unique(np.rint(np.linspace(0, len(flat) - 1, POSES)).astype(int))
         poses = rr.LineStrips2D(list(flat[chosen]), colors=faded(label, 0.3), radii=pixels(0.8), draw_order=10.0)
         recording.log(f"{root}/poses", poses, static=True)
+        arm = problem.task.arm
+        if isinstance(arm, FloatingArm) and arm.floats:
+            edges = rr.LineStrips2D.columns(strips=list(_flat(outlines(arm, evaluation.base)[rows])))
+            look = {"colors": rgba(label), "radii": pixels(1.5), "draw_order": 45.0}
+            recording.log(f"{root}/spacecraft", rr.LineStrips2D.from_fields(**look), static=True)
+            recording.send_columns(f"{root}/spacecraft", time, edges)
 
 
 def _send_stick(
@@ -255,11 +271,27 @@ def _flat(points: Array) -> Array:
 
 def _send_arm(recording: Any, problem: Problem, evaluation: Evaluation, time: list[Any], q: Array) -> None:
     """The user's own picture of the arm in the colour of the method; without one the stick figure must do."""
-    draw_arm(recording, problem.task.arm, slug(evaluation.label), rgba(evaluation.label, SOLID), time, q)
+    moving = evaluation.base.reaction is None
+    rows = _finite(evaluation)
+    poses = (evaluation.base.position[rows], evaluation.base.rotation[rows]) if moving else None
+    arm, root = problem.task.arm, slug(evaluation.label)
+    draw_arm(recording, arm, root, rgba(evaluation.label, SOLID), time, q, poses)
+    if isinstance(arm, FloatingArm) and moving and arm.spacecraft.mass > 0:
+        _send_spacecraft(recording, arm, root, evaluation.label)
 
 
-def draw_arm(recording: Any, arm: Arm, root: str, color: tuple[int, ...], time: list[Any], q: Array) -> None:
-    """The arm's picture at q (K, n) on the time line, below the entity `root`."""
+def draw_arm(
+    recording: Any,
+    arm: Arm,
+    root: str,
+    color: tuple[int, ...],
+    time: list[Any],
+    q: Array,
+    base: tuple[Array, Array] | None = None,
+) -> None:
+    """The arm's picture at q (K, n) on the time line, below the entity `root`; base: the root link's positions (K, 3) and
+    rotations (K, 3, 3) where it moves.
+    """
     description = arm.description
     try:
         xml, notes = picture(description)
@@ -275,7 +307,7 @@ def draw_arm(recording: Any, arm: Arm, root: str, color: tuple[int, ...], time: 
         joints = {joint.name: joint for joint in tree.joints()}
         moving = [
             joints[name].compute_transform_columns(column, clamp=False)
-            for name, column in zip(description.joints, q.T, strict=True)
+            for name, column in zip(description.actuated, q.T, strict=True)
         ]
     except Exception as error:
         _log.warning("%s cannot be drawn (%s): the recording shows stick figures only", description.file, error)
@@ -287,16 +319,23 @@ def draw_arm(recording: Any, arm: Arm, root: str, color: tuple[int, ...], time: 
         else:
             solid = getattr(rr, shape).from_fields(colors=[color], fill_mode="solid")
             recording.log(entity, solid, static=True)
-    base = rr.Transform3D(
+    stand = rr.Transform3D(
         translation=arm.base_position,
         quaternion=Rotation.from_euler("xyz", arm.base_rpy).as_quat(),
         parent_frame="tf#/",
         child_frame=f"{root}/{description.base}",
     )
-    recording.log(f"{root}/tf/base", base, static=True)  # without it an arm with frames of its own is not shown
+    # Without it an arm with frames of its own is not shown.
+    if base is None:
+        recording.log(f"{root}/tf/base", stand, static=True)
+    else:
+        frames = {"parent_frame": ["tf#/"] * len(q), "child_frame": [f"{root}/{description.base}"] * len(q)}
+        turned = Rotation.from_matrix(base[1]).as_quat()
+        moved = rr.Transform3D.columns(translation=base[0], quaternion=turned, **frames)
+        recording.send_columns(f"{root}/tf/base", time, moved)
     for joint, transform in _rigid(description.xml, description.joints, root):
         recording.log(_transform(root, joint), transform, static=True)
-    for joint, columns in zip(description.joints, moving, strict=True):
+    for joint, columns in zip(description.actuated, moving, strict=True):
         recording.send_columns(_transform(root, joint), time, columns)
 
 
@@ -327,6 +366,20 @@ def send_obstacles(recording: Any, shapes: Sequence[Shape], planar: bool) -> Non
         else:
             solid = rr.Boxes3D(sizes=[shape.size], centers=[shape.position], **place, **common)
         recording.log(f"obstacles/{slug(shape.name)}", solid, static=True)
+
+
+def _send_spacecraft(recording: Any, arm: FloatingArm, root: str, label: str) -> None:
+    """The box that stands for the spacecraft, in the frame of the root link."""
+    shape = box(arm)
+    solid = rr.Boxes3D(
+        sizes=[shape.size],
+        centers=[shape.position],
+        quaternions=[Rotation.from_rotvec(shape.rotation).as_quat()],
+        colors=[rgba(label, SOLID)],
+        fill_mode="solid",
+    )
+    recording.log(f"{root}/spacecraft", rr.CoordinateFrame(f"{root}/{arm.description.base}"), static=True)
+    recording.log(f"{root}/spacecraft", solid, static=True)
 
 
 def _transform(root: str, joint: str) -> str:

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from scipy.spatial.transform import Rotation
 
 from pipeline import certificate, resample
 from pipeline.config import PublishedConfig, RunConfig
@@ -43,6 +44,15 @@ UNITS = {
     "closed_loop_joint_error": "rad",
     "closed_loop_tracking_error": "m",
     "min_clearance_between": "m",
+    "peak_reaction_force": "N",
+    "peak_reaction_torque": "N m",
+    "reaction_force_integral": "N² s",
+    "reaction_torque_integral": "N² m² s",
+    "max_base_turn": "rad",
+    "final_base_turn": "rad",
+    "final_base_shift": "m",
+    "base_rotation_integral": "rad²/s",
+    "max_floating_path_error": "m",
     "wall_time_s": "s",
 }
 
@@ -126,6 +136,26 @@ def _orientation(problem: Problem, e: Evaluation) -> dict[str, Any]:
     }
 
 
+def _base(problem: Problem, e: Evaluation) -> dict[str, Any]:
+    """What a floating base does, or what a base that stands still feels."""
+    base = e.base
+    if base.reaction is not None:
+        peaks = [float(np.linalg.norm(base.reaction[:, part], axis=1).max()) for part in (slice(3), slice(3, 6))]
+        row = dict(zip(("peak_reaction_force", "peak_reaction_torque"), peaks, strict=True))
+        names = ("reaction_force", "reaction_torque") if problem.task.arm.base_coordinates else ()
+        return row | {f"{name}_integral": e.integral(name) for name in names}
+    floating = base.floating
+    return {
+        "max_base_turn": base.turn.max(),
+        "final_base_turn": base.turn[-1],
+        "final_base_shift": float(np.linalg.norm(base.position[-1] - base.position[0])),
+        "base_rotation_integral": e.integral("base_rotation"),
+        "linear_momentum_residual": np.nan if floating is None else floating.linear,
+        "angular_momentum_residual": np.nan if floating is None else floating.angular,
+        "max_floating_path_error": np.nan if floating is None else floating.path_error,
+    }
+
+
 def _row(problem: Problem, e: Evaluation) -> dict[str, Any]:
     radius = int(np.argmin(e.spectral_radius))
     row: dict[str, Any] = {
@@ -144,6 +174,7 @@ def _row(problem: Problem, e: Evaluation) -> dict[str, Any]:
     }
     for name, values in (("velocity", e.qd), ("torque", e.tau), ("power", e.power)):
         row |= {f"peak_{name}_{j + 1}": peak for j, peak in enumerate(np.abs(values).max(axis=0))}
+    row |= _base(problem, e)
     if problem.obstacles is not None:
         row |= {"min_clearance": e.clearance.min(), "min_clearance_between": e.clearance_between}
     for suffix, excess in (("", e.limit_excess), ("_between", e.limit_excess_between)):
@@ -167,13 +198,19 @@ def _without_numbers(row: dict[str, Any]) -> dict[str, Any]:
 
 
 def trajectories(evaluations: Sequence[Evaluation]) -> pd.DataFrame:
-    """The long table: method, optimum, time, q_1..n, qd_1..n, qdd_1..n, tau_1..n, x, y, z."""
+    """The long table: method, optimum, time, q_1..n, qd_1..n, qdd_1..n, tau_1..n, x, y, z; of a floating base its position
+    base_x, .. and rotation vector base_rx, .. in the world.
+    """
     parts = []
     for e in evaluations:
         columns: dict[str, Any] = {"method": e.method, "optimum": e.solution.optimum, "time": e.time}
         for name, values in (("q", e.q), ("qd", e.qd), ("qdd", e.qdd), ("tau", e.tau)):
             columns |= {f"{name}_{j + 1}": values[:, j] for j in range(values.shape[1])}
         columns |= dict(zip("xyz", e.position.T, strict=True))
+        if e.base.reaction is None:
+            turned = Rotation.from_matrix(e.base.rotation).as_rotvec()
+            columns |= {f"base_{axis}": column for axis, column in zip("xyz", e.base.position.T, strict=True)}
+            columns |= {f"base_r{axis}": column for axis, column in zip("xyz", turned.T, strict=True)}
         parts.append(pd.DataFrame(columns))
     return pd.concat(parts, ignore_index=True)
 
@@ -187,9 +224,9 @@ def markdown(
     lines = [
         f"# {config.name}",
         "",
-        f"{arm.name} ({len(arm.joints)} joints, r = {problem.task.redundancy}), path of {reference.geometry.length:.4g} m "
+        f"{arm.name} ({len(arm.actuated)} joints, r = {problem.task.redundancy}), path of {reference.geometry.length:.4g} m "
         f"in {reference.duration:g} s, {len(problem.times) - 1} intervals, objective {config.objective.kind}, "
-        f"limits {config.limits.kind}, boundary {config.boundary.kind}, seed {config.seed}.",
+        f"limits {config.limits.kind}, boundary {config.boundary.kind}, base {config.base.kind}, seed {config.seed}.",
         "",
         *markdown_table(_by_quantity(evaluations, table)),
         "",
