@@ -27,6 +27,7 @@ from pipeline import urdf
 from pipeline.arrays import Array
 from pipeline.urdf import Description
 
+Vector = Sequence[float] | Array
 BLOCK = 16  # copies per plant: beyond this Drake's cost per knot no longer falls
 STEP = 1e-5  # central differences of smooth rigid-body functions: truncation and rounding balance near 1e-10
 
@@ -108,14 +109,14 @@ class Arm:
     def __init__(
         self,
         description: Description,
-        offset: Sequence[float] = (0.0, 0.0, 0.0),
+        offset: Vector = (0.0, 0.0, 0.0),
         *,
-        offset_rpy: Sequence[float] = (0.0, 0.0, 0.0),
-        base_position: Sequence[float] = (0.0, 0.0, 0.0),
-        base_rpy: Sequence[float] = (0.0, 0.0, 0.0),
-        gravity: Sequence[float] = (0.0, 0.0, 0.0),
+        offset_rpy: Vector = (0.0, 0.0, 0.0),
+        base_position: Vector = (0.0, 0.0, 0.0),
+        base_rpy: Vector = (0.0, 0.0, 0.0),
+        gravity: Vector = (0.0, 0.0, 0.0),
         payload: float = 0.0,
-        armature: float | Sequence[float] = 0.0,
+        armature: float | Vector = 0.0,
     ) -> None:
         self.description = description
         self.n = len(description.joints)
@@ -141,7 +142,10 @@ class Arm:
 
     # --- the base: it stands still; see floating.py for one that moves -------------------------------------------
 
-    floats = False
+    @property
+    def floats(self) -> bool:
+        """Whether the base is free, without forces from outside."""
+        return False
 
     @property
     def base_coordinates(self) -> int:

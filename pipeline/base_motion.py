@@ -167,16 +167,16 @@ def _check(
         error[i] = plant.momentum() - momentum
         plant.at(places[i], ways[i], joints(t), np.concatenate([np.zeros(6), qd]))
         own[i] = plant.momentum()
-    relative = [
+    linear, angular_error = (
         float(np.linalg.norm(error[:, part], axis=1).max() / max(np.linalg.norm(own[:, part], axis=1).max(), 1e-300))
         for part in (slice(3), slice(3, 6))
-    ]
+    )
     target, rows = problem.reference.position(time), problem.task.rows
     off = np.empty(len(time))
     for i, t in enumerate(time):
         plant.at(position[i], rotation[i], joints(t), np.zeros(6 + joints(t).size))
         off[i] = np.linalg.norm(plant.tip()[rows] - target[i, : len(rows)])
-    return Floating(time, position, rotation, *relative, float(off.max()))
+    return Floating(time, position, rotation, linear, angular_error, float(off.max()))
 
 
 def _angular_velocity(quaternion: Array, rate: Array) -> Array:

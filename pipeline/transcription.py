@@ -37,6 +37,7 @@ from pipeline.problem import INTEGRALS, Boundary, Problem
 POSITION_SCALE = 0.03
 VELOCITY_SCALE = 0.03  # for objectives without kinetic energy: small, like the positions
 KNOTS_PER_BINDING = 10  # a Python binding pays for its size squared: more, smaller bindings are cheaper up to a point
+NEGLIGIBLE = 1e-4
 SHARE = 0.1  # of the energy in the scaling of an objective to which not all velocities count
 Block = NDArray[np.int_]
 Rate = Callable[[Array, Array], tuple[Array, Array, Array]]  # of an integral, with its derivatives by q and qd
@@ -142,7 +143,9 @@ class Transcription:
         self.qd_entry, self.qd_guess = qd[0], qd[1:]
         costs: Costs = integrals(self.problem, self.times, q)
         self.tau_guess = costs.tau[1:, self.lifted]
-        self.cost = costs.value(self.objective) or 1.0
+        # A guess without any base rotation has a cost near zero; its size is then seen from the joints' motion.
+        least = NEGLIGIBLE * self.objective.base_rotation * costs.velocity_norm
+        self.cost = max(costs.value(self.objective), least) or 1.0
         self.energy = costs.kinetic_energy if costs.kinetic_energy > 0 else 1.0
         if self.lagrangian.is_quadratic or self.bounds_first_order:
             # Half |w|^2 is the energy's share of the cost, or its ratio to the guess's where it is only bounded.
@@ -319,12 +322,12 @@ class Transcription:
     def _bound_squares(self, kind: str, block: Block, total: Any, bound: float) -> None:
         # u = s tau, and the integral is the sum of tau'tau dt.
         own = [column for column, row in enumerate(self.lifted) if self.kinds[row] == kind]
-        weight = (self.dt[block, None] / (self.torque_scale[np.ix_(block, own)] ** 2 * bound)).ravel()
+        weight = (self.dt[block, None] / (self.torque_scale[block][:, own] ** 2 * bound)).ravel()
         form = np.diag(np.append(2 * weight, 0.0))
         linear = np.append(np.zeros(len(weight)), -1.0)
         convex = QuadraticConstraint.HessianType.kPositiveSemidefinite
         constraint = QuadraticConstraint(form, linear, -np.inf, 0.0, convex)
-        self.program.AddConstraint(constraint, np.append(self.u[np.ix_(block, own)].ravel(), total))
+        self.program.AddConstraint(constraint, np.append(self.u[block][:, own].ravel(), total))
 
     def _add_tracking(self, knots: Block) -> None:
         """x(q_i) = x_ref,i, and for poses R(q_i) = R_ref,i."""

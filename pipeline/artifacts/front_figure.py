@@ -12,7 +12,13 @@ from pipeline.artifacts import style
 from pipeline.files import write_beside
 from pipeline.front import hypervolume
 
-LABELS = {"kinetic_energy": "Kinetic-energy integral [J s]", "torque": "Squared-torque integral [N² m² s]"}
+LABELS = {
+    "kinetic_energy": "Kinetic-energy integral [J s]",
+    "torque": "Squared-torque integral [N² m² s]",
+    "base_rotation": "Integral of the base's squared angular velocity [rad²/s]",
+    "reaction_force": "Integral of the squared force on the base [N² s]",
+    "reaction_torque": "Integral of the squared torque on the base [N² m² s]",
+}
 
 
 def draw(front: pd.DataFrame, name: str) -> Figure:

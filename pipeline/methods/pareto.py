@@ -37,6 +37,8 @@ from pipeline.problem import (
 from pipeline.transcription import Transcription
 
 SAME_CLASS = 0.6  # [rad] neighbouring points of one class of paths differ by less at every knot
+VANISHING = "base_rotation"  # can be zero along a whole path, where redundancy is left for it
+LITTLE = 1e-4  # of the other integral in its extreme
 IMPROVED = 1e-7  # relative: a smaller gain is none
 
 
@@ -69,19 +71,21 @@ def solve(
     """The front's motions, from the first extreme to the second. The first's statistics hold `front`, a row per point."""
     first, second = options.objectives
     known: list[Array] = []
-    extremes: list[Point] = []
-    for own in (first, second):
-        alone = replace(problem, objective=_only(own))
-        optima = global_planner.solve(alone, planner, seed, workers, progress)
+    found: dict[str, Point] = {}
+    for own in sorted((first, second), key=lambda name: name == VANISHING):
+        other = second if own == first else first
+        objective = _only(own)
+        if own == VANISHING and other in found:
+            objective = _kept_unique(own, other, found[other], options)
+        optima = global_planner.solve(replace(problem, objective=objective), planner, seed, workers, progress)
         if optima[0].status is not Status.SOLVED:
             message = f"the extreme of {own} was not found: {optima[0].message or optima[0].status.value}"
             return [replace(optima[0], method="pareto", message=message)]
         known += [optimum.trajectory.q for optimum in optima]
         weights = (1.0, 0.0) if own == first else (0.0, 1.0)
         q = optima[0].trajectory.q
-        extremes.append(
-            Point(f"minimise:{own}", weights, None, np.inf, q, _values(problem, options, q), True, "success")
-        )
+        found[own] = Point(f"minimise:{own}", weights, None, np.inf, q, _values(problem, options, q), True, "success")
+    extremes = [found[first], found[second]]
     best = np.array([extremes[0].values[0], extremes[1].values[1]])
     worst = np.array([extremes[1].values[0], extremes[0].values[1]])
     if not np.all(worst - best > IMPROVED * np.abs(best)):
@@ -177,12 +181,21 @@ def _values(problem: Problem, options: ParetoOptions, q: Array) -> tuple[float, 
     return first, second
 
 
+def _kept_unique(own: str, other: str, extreme: Point, options: ParetoOptions) -> Objective:
+    """`own` with a little of the other integral: many motions can bring it to zero, and of those one is wanted.
+
+    extreme: the other's optimum, at which both integrals set the scale.
+    """
+    values = dict(zip(options.objectives, extreme.values, strict=True))
+    return _sum({own: 1.0, other: LITTLE * values[own] / values[other]})
+
+
 def _only(name: str) -> Objective:
     return _sum({name: 1.0})
 
 
 def _sum(weights: Mapping[str, float]) -> Objective:
-    return Objective(**{"kinetic_energy": 0.0, **weights})
+    return replace(Objective(kinetic_energy=0.0), **weights)  # type: ignore[arg-type]
 
 
 def _objective(options: ParetoOptions, weights: tuple[float, float]) -> Objective:
