@@ -151,7 +151,11 @@ class Transcription:
             # Half |w|^2 is the energy's share of the cost, or its ratio to the guess's where it is only bounded.
             share = 1 / self.cost if self.lagrangian.is_quadratic else 1 / self.energy
             metric = self.lagrangian.metric(q[1:]) if self.lagrangian.is_quadratic else self.arm.mass_matrix(q[1:])
-            if self.nb and self.lagrangian.inertia == 0:
+            if self.nb and not self.arm.floats:
+                # Coordinates that are held need no metric, and a base without mass has none.
+                metric[:, : self.nb], metric[:, :, : self.nb] = 0.0, 0.0
+                metric[:, range(self.nb), range(self.nb)] = 1.0
+            elif self.nb and self.lagrangian.inertia == 0:
                 # Not all velocities count: a share of the energy makes it regular.
                 metric = metric + SHARE * self.cost / self.energy * self.arm.mass_matrix(q[1:])
             root = np.linalg.cholesky(metric)
