@@ -61,6 +61,11 @@ class Description:
         """The names of the arm's own joints."""
         return self.joints[self.base_coordinates :]
 
+    @property
+    def turning(self) -> NDArray[np.bool_]:
+        """Which of the arm's own joints turn."""
+        return self.revolute[self.base_coordinates :]
+
     @cached_property
     def for_drake(self) -> tuple[str, str]:
         """The reduced URDF and its root link."""

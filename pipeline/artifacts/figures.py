@@ -183,7 +183,7 @@ def spectral_radius(problem: Problem, evaluations: Sequence[Evaluation], name: s
     """The largest eigenvalue of the inertia matrix (Fig. 8), each motion's least value marked."""
     figure = _figure(f"{name}: spectral radius of the inertia matrix", 10.0, 4.8)
     (axes,) = _stack(figure, problem, 1)
-    unit = "kg m$^2$" if problem.task.arm.description.revolute.all() else "SI units"
+    unit = "kg m$^2$" if problem.task.arm.description.turning.all() else "SI units"
     axes.set_ylabel(rf"Spectral radius $\rho(M)$ [{unit}]")
     lowest = []
     for i, e in enumerate(evaluations):
@@ -236,7 +236,7 @@ def _ranges(problem: Problem) -> Array:
     bounds, secondary = problem.bounds, problem.objective.secondary
     if secondary is not None and "joint_centering" in secondary.criteria:
         return np.array([secondary.lower, secondary.upper])
-    return np.array([bounds.lower, bounds.upper])
+    return np.array([bounds.lower, bounds.upper])[:, problem.task.arm.base_coordinates :]
 
 
 def _by_joint(
@@ -379,5 +379,5 @@ def _usable(e: Evaluation, time: Array) -> int:
 
 
 def _unit(problem: Problem, turning: str, sliding: str) -> str:
-    revolute = problem.task.arm.description.revolute
+    revolute = problem.task.arm.description.turning
     return turning if revolute.all() else f"{turning} or {sliding}" if revolute.any() else sliding

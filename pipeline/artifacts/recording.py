@@ -30,7 +30,7 @@ from pipeline.artifacts import blueprint, style
 from pipeline.artifacts.blueprint import faded, pixels, rgba, slug
 from pipeline.artifacts.picture import picture
 from pipeline.artifacts.solids import outline
-from pipeline.artifacts.spacecraft import box, outlines
+from pipeline.artifacts.spacecraft import box, corners, outlines
 from pipeline.evaluation import Evaluation
 from pipeline.floating import FloatingArm
 from pipeline.geometry import Shape
@@ -116,9 +116,9 @@ def _layout(problem: Problem, evaluations: Sequence[Evaluation], front: bool) ->
     arm = problem.task.arm
     floats = isinstance(arm, FloatingArm) and arm.floats
     if isinstance(arm, FloatingArm) and floats:
-        points += [outlines(arm, e.base)[_finite(e)].reshape(-1, 3) for e in evaluations]
+        points += [corners(arm, e.base)[_finite(e)].reshape(-1, 3) for e in evaluations]
     labels = [evaluation.label for evaluation in evaluations]
-    revolute = problem.task.arm.description.revolute.tolist()
+    revolute = problem.task.arm.description.turning.tolist()
     return blueprint.build(
         labels, np.concatenate(points), revolute, _planar(problem), _ranges(evaluations), front, floats
     )

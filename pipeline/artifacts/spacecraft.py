@@ -48,8 +48,18 @@ def _root_inertia(arm: FloatingArm) -> tuple[float, tuple[float, ...], Array]:
 
 
 def outlines(arm: FloatingArm, base: Base) -> Array:
-    """The box's mid-plane, closed: (N + 1, 5, 3) [m] in the world."""
+    """The face on which the arm stands, closed: (N + 1, 5, 3) [m] in the world; of a planar arm's plate the middle."""
+    level = 0.0 if arm.planar else 1.0 if box(arm).position[2] <= 0 else -1.0
+    return _moved(arm, base, np.array([[x, y, level] for x, y in ((1, 1), (-1, 1), (-1, -1), (1, -1), (1, 1))]))
+
+
+def corners(arm: FloatingArm, base: Base) -> Array:
+    """The box's corners (N + 1, 8, 3) [m] in the world."""
+    return _moved(arm, base, np.stack(np.meshgrid(*[(-1, 1)] * 3), axis=-1).reshape(-1, 3))
+
+
+def _moved(arm: FloatingArm, base: Base, points: Array) -> Array:
+    """Points (P, 3) in half edges from the box's middle, in the world (N + 1, P, 3)."""
     shape = box(arm)
-    corners = np.array([[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [1, 1, 0]]) * np.array(shape.size) / 2
-    own = Rotation.from_rotvec(shape.rotation).apply(corners) + np.array(shape.position)
+    own = Rotation.from_rotvec(shape.rotation).apply(points * np.array(shape.size) / 2) + np.array(shape.position)
     return base.position[:, None] + own @ base.rotation.swapaxes(1, 2)
