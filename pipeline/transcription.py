@@ -25,7 +25,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from pydrake.solvers import LinearConstraint, MathematicalProgram, QuadraticConstraint
 
-from pipeline import ipopt
+from pipeline import floating_rows, ipopt
 from pipeline.arrays import Array
 from pipeline.clearance import Clearance, Obstacles
 from pipeline.costs import Costs, integrals, row_kinds, velocities
@@ -49,6 +49,8 @@ class Transcription:
     elastic: kinds of limits (position, velocity, torque, power, clearance) that may all be exceeded by the same fraction;
     that fraction is then what is minimised. keep_off: [m] by how much more than the margin obstacles are kept off.
     """
+
+    position_scale = POSITION_SCALE
 
     def __init__(
         self, problem: Problem, times: Array, guess: Array, *, elastic: Collection[str] = (), keep_off: float = 0.0
@@ -91,24 +93,24 @@ class Transcription:
         self._limit()
         first_free = 1 if problem.boundary is Boundary.FIXED else 0
         # Closed joints close the path, unless the base has moved under them.
-        for block in _blocks(first_free, self.intervals + (0 if closed and not self.arm.floats else 1)):
+        for block in self.blocks(first_free, self.intervals + (0 if closed and not self.arm.floats else 1)):
             self._add_tracking(block)
-        for block in _blocks(0, self.intervals):
+        for block in self.blocks(0, self.intervals):
             if self.lagrangian.is_quadratic and not elastic:
                 self._add_quadratic(block)
             if self.lifted:
                 self._add_torque(block)
             if isinstance(self.arm, FloatingArm) and self.arm.floats:
-                self._conserve_momentum(self.arm, block)
+                floating_rows.conserve_momentum(self, self.arm, block)
         if self.enters and isinstance(self.arm, FloatingArm):
-            self._enter(self.arm)
+            floating_rows.enter(self, self.arm)
         if np.isfinite(self.limits.attitude) and isinstance(self.arm, FloatingArm):
-            self._limit_attitude(self.arm)
+            floating_rows.limit_attitude(self, self.arm)
         if self.row_weights.any() and not elastic:
             flat = self.u[:, self.row_weights > 0].ravel()
             self.program.AddQuadraticCost(2 * np.eye(len(flat)), np.zeros(len(flat)), flat, is_convex=True)
         if self.objective.secondary is not None and not elastic:
-            for block in _blocks(0, self.intervals + 1):
+            for block in self.blocks(0, self.intervals + 1):
                 self._add_secondary(block)
         if problem.obstacles is not None:
             self._keep_clear(problem.obstacles, first_free)
@@ -209,20 +211,20 @@ class Transcription:
         first = 1 if self.problem.boundary is Boundary.FIXED else 0
         if np.isfinite(limits.lower).any() or np.isfinite(limits.upper).any():
             low, high = (np.tile(POSITION_SCALE * bound, count + 1 - first) for bound in (limits.lower, limits.upper))
-            self._keep_within("position", low, high, self.y[first:].ravel(), (high - low) / 2)
+            self.keep_within("position", low, high, self.y[first:].ravel(), (high - low) / 2)
         if np.isfinite(limits.velocity).any():
             # Scaled so that a row's coefficients are of order one.
             size = np.abs(self.to_velocity).max(axis=(1, 2))
             bound = (limits.velocity / size[:, None]).ravel()
             rows = None if self.diagonal else sp.block_diag(list(self.to_velocity / size[:, None, None]))
-            self._keep_within("velocity", -bound, bound, self.w.ravel(), bound, rows)
+            self.keep_within("velocity", -bound, bound, self.w.ravel(), bound, rows)
         if np.isfinite(limits.torque).any():
             bound = (limits.torque[self.lifted] * self.torque_scale).ravel()
-            self._keep_within("torque", -bound, bound, self.u.ravel(), bound)
+            self.keep_within("torque", -bound, bound, self.u.ravel(), bound)
         for joint in np.flatnonzero(np.isfinite(limits.power)):
             self._limit_power(int(joint), float(limits.power[joint]))
 
-    def _keep_within(self, kind: str, low: Array, high: Array, unknowns: Any, slack: Array, rows: Any = None) -> None:
+    def keep_within(self, kind: str, low: Array, high: Array, unknowns: Any, slack: Array, rows: Any = None) -> None:
         """low <= rows @ unknowns <= high; as bounds where it can be, and softened by excess * slack if elastic."""
         if kind not in self.elastic:
             if rows is None:
@@ -295,7 +297,7 @@ class Transcription:
 
     def _bound_integrals(self) -> None:
         """Sums of a few knots are unknowns of their own, bounded together: the rows stay sparse."""
-        blocks = _blocks(0, self.intervals)
+        blocks = self.blocks(0, self.intervals)
         for kind in INTEGRALS:
             bound = getattr(self.integral_bounds, kind)
             if not np.isfinite(bound):
@@ -345,13 +347,13 @@ class Transcription:
             return value.ravel(), rows.reshape(count * m, count * n)
 
         pattern = [(k * m + i, k * n + j) for k in range(count) for i in range(m) for j in range(n)]
-        self._tracking_rows.append(self._add_rows(position, np.zeros(count * m), self.y[knots].ravel(), pattern))
+        self._tracking_rows.append(self.add_rows(position, np.zeros(count * m), self.y[knots].ravel(), pattern))
 
     def _keep_clear(self, obstacles: Obstacles, first: int) -> None:
         """Every link's distance from every obstacle, by Drake's smooth penalty: at most 1 (clearance.py)."""
         penalty = Clearance(self.arm, obstacles).rows(self.keep_off)
         soft = "clearance" in self.elastic
-        for knots in _blocks(first, self.intervals + 1):
+        for knots in self.blocks(first, self.intervals + 1):
             shape, split = (len(knots), self.n), len(knots) * self.n
 
             def rows(x: Array, shape: tuple[int, int] = shape, split: int = split) -> tuple[Array, Array]:
@@ -419,70 +421,7 @@ class Transcription:
                 row = k * len(lifted) + i
                 pattern += [(row, c * n + j) for c in sorted(columns) for j in range(n)]
                 pattern.append((row, split_w + row))
-        self._add_rows(torque, np.zeros(count * len(lifted)), unknowns, pattern)
-
-    # --- a base that floats -------------------------------------------------------------------------------------
-
-    def _conserve_momentum(self, arm: FloatingArm, block: Block) -> None:
-        """M_b qd_i = p at the middle of every interval, q_(i-1) + dt_i / 2 qd_i: of second order in the step."""
-        self._momentum_rows(arm, self.y[block], self.w[block], block, self.dt[block] / 2)
-
-    def _enter(self, arm: FloatingArm) -> None:
-        """The velocity that a cycle is entered with: the joints' is the last interval's, the base's follows from momentum."""
-        nb, last = self.nb, np.array([self.intervals - 1])
-        joints = self.to_velocity[-1][nb:] / np.abs(self.to_velocity[-1][nb:]).max()
-        both = np.hstack([joints, -joints])
-        unknowns = np.concatenate([self.w_entry[0], self.w[-1]])
-        self.program.AddLinearEqualityConstraint(both, np.zeros(len(joints)), unknowns)
-        self._momentum_rows(arm, self.y[:1], self.w_entry, last, np.zeros(1))
-
-    def _momentum_rows(self, arm: FloatingArm, y: Any, w: Any, intervals: Block, ahead: Array) -> None:
-        """M_b qd = p `ahead` [s] of the positions y, each row divided by M_bb of the guess and the size of its velocity."""
-        nb, n, count = self.nb, self.n, len(intervals)
-        rate = self.to_velocity[intervals]
-        size = np.abs(rate[:, :nb]).max(axis=2)
-        weight = np.linalg.inv(arm.mass_matrix(self.q_guess[intervals])[:, :nb, :nb]) / size[:, :, None]
-        diagonal, split = np.arange(count), count * n
-
-        def momentum(x: Array) -> tuple[Array, Array]:
-            qd = (rate @ x[split:].reshape(count, n, 1))[:, :, 0]
-            q = x[:split].reshape(count, n) / POSITION_SCALE + ahead[:, None] * qd
-            value, by_q, by_qd = arm.momentum_residual(q, qd)
-            rows = np.zeros((count, nb, 2 * count, n))
-            rows[diagonal, :, diagonal] = weight @ by_q / POSITION_SCALE
-            rows[diagonal, :, count + diagonal] = weight @ (by_qd + ahead[:, None, None] * by_q) @ rate
-            return (weight @ value[:, :, None]).ravel(), rows.reshape(count * nb, -1)
-
-        pattern = [
-            (k * nb + i, c * n + j) for k in range(count) for i in range(nb) for c in (k, count + k) for j in range(n)
-        ]
-        self._add_rows(momentum, np.zeros(count * nb), np.concatenate([y.ravel(), w.ravel()]), pattern)
-
-    def _limit_attitude(self, arm: FloatingArm) -> None:
-        """The base's turn from its start at all knots: a bound on yaw in the plane, else on its cosine."""
-        bound = self.limits.attitude
-        if arm.planar:
-            most = np.full(self.intervals, POSITION_SCALE * bound)
-            self._keep_within("attitude", -most, most, self.y[1:, 2], most)
-            return
-        soft = "attitude" in self.elastic
-        room = 1 - np.cos(bound)
-        for knots in _blocks(1, self.intervals + 1):
-            count, split = len(knots), len(knots) * 3
-
-            def rows(x: Array, count: int = count, split: int = split) -> tuple[Array, Array]:
-                q = np.zeros((count, self.n))
-                q[:, 3:6] = x[:split].reshape(count, 3) / POSITION_SCALE
-                cosine, by_q = arm.attitude_cosine(q)
-                jacobian = np.zeros((count, x.size))
-                for k in range(count):
-                    jacobian[k, 3 * k : 3 * k + 3] = -by_q[k, 3:6] / (POSITION_SCALE * room)
-                jacobian[:, split:] = -1.0
-                return (1 - cosine) / room - x[split:].sum(), jacobian
-
-            unknowns = np.concatenate([self.y[knots, 3:6].ravel(), self.excess if soft else []])
-            free = np.full(count, -np.inf)
-            self.program.AddConstraint(DifferentiableConstraint(rows), lb=free, ub=np.ones(count), vars=unknowns)
+        self.add_rows(torque, np.zeros(count * len(lifted)), unknowns, pattern)
 
     def _before(self, interval: int) -> int | None:
         """The interval whose velocity precedes this one's; None where the motion begins."""
@@ -492,12 +431,14 @@ class Transcription:
             return None
         return self.intervals if self.enters else self.intervals - 1
 
-    def _add_rows(self, function: Any, target: Array, unknowns: Any, pattern: list[tuple[int, int]]) -> Any:
+    def add_rows(self, function: Any, target: Array, unknowns: Any, pattern: list[tuple[int, int]]) -> Any:
         rows = DifferentiableConstraint(function)
         binding = self.program.AddConstraint(rows, lb=target, ub=target, vars=unknowns)
         binding.evaluator().SetGradientSparsityPattern(pattern)
         return rows
 
-
-def _blocks(first: int, end: int) -> list[Block]:
-    return [np.arange(start, min(start + KNOTS_PER_BINDING, end)) for start in range(first, end, KNOTS_PER_BINDING)]
+    @staticmethod
+    def blocks(first: int, end: int) -> list[Block]:
+        """The numbers from `first` to before `end`, as many at a time as one binding serves."""
+        starts = range(first, end, KNOTS_PER_BINDING)
+        return [np.arange(start, min(start + KNOTS_PER_BINDING, end)) for start in starts]
