@@ -186,8 +186,10 @@ def _optimise_start(context: tuple[Problem, Array, GlobalOptions], guess: Array)
 
 def _has_strayed(problem: Problem, times: Array, guess: Array, optimum: Optimum) -> bool:
     """Whether a solve ended far above a guess that keeps every limit: its first steps led into a motion with jumps, which
-    coarse differences make an optimum of its own. A finer grid then starts from the guess.
+    coarse differences make an optimum of its own. A finer grid then starts from the guess. Accelerations must count for it.
     """
+    if not problem.objective.second_order:
+        return False
     if optimum.converged and optimum.cost <= STRAYED * float(objective_values(problem, times, guess[None])[0]):
         return False
     return not problem.constrained or all(v.relative <= ROOM for v in violations(problem, times, guess))
@@ -259,7 +261,7 @@ def _refine(context: tuple[Problem, list[Array], GlobalOptions], start: Optimum)
             continue
         failures += 1  # one grid may be unlucky; the next starts from the last that was not
         if failures > 1:
-            return replace(finer, solves=solves)
+            return replace(finer, converged=False, solves=solves)
     optimum = replace(optimum, solves=solves)
     if problem.obstacles is not None and optimum.converged:
         optimum = _clear_between(problem, problem.obstacles, grids[-1], optimum, options)
