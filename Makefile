@@ -13,10 +13,10 @@ run: $(VENV)/.installed ## set up, then run the third trajectory of the PMKE pap
 	$(BIN)/python -m pipeline +experiment=traj3
 
 test: $(VENV)/.installed-dev ## set up, then run the whole test suite
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile
 
 fast: $(VENV)/.installed-dev ## the tests that take less than a few seconds each
-	$(BIN)/python -m pytest -m "not slow"
+	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile -m "not slow"
 
 lint: $(VENV)/.installed-dev ## lint, format check and type check
 	$(BIN)/ruff check .
