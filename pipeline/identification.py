@@ -12,6 +12,7 @@ from __future__ import annotations
 import xml.etree.ElementTree as ET
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -166,9 +167,15 @@ def _wanted(printed: Sequence[Printed]) -> list[tuple[str, str, int]]:
     return list(dict.fromkeys(entry.motion for entry in printed))
 
 
+@cache
+def _as_printed(name: str) -> Problem:
+    """The problem of an experiment with the arm as printed: composed once in every process."""
+    return prepare(experiment(name, "robot=planar3r_printed"))
+
+
 def _problem(name: str, masses: Array) -> Problem:
-    """The problem of an experiment, with the arm as printed but for its masses."""
-    problem = prepare(experiment(name, "robot=planar3r_printed"))
+    """The same with other masses."""
+    problem = _as_printed(name)
     assert isinstance(problem.task, PositionTask)
     return replace(problem, task=PositionTask(with_masses(problem.task.arm, masses), problem.task.axes))
 

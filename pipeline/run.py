@@ -64,7 +64,16 @@ def solve(
 
 def run_and_write(config: schema.RunConfig, folder: File) -> int:
     """One whole run into `folder`; returns the exit code."""
-    from pipeline.artifacts import closed_loop_figure, export, figures, front_figure, recording, study_figure, tables
+    from pipeline.artifacts import (
+        closed_loop_figure,
+        export,
+        figures,
+        front_figure,
+        identification_figure,
+        recording,
+        study_figure,
+        tables,
+    )
     from pipeline.console import Console
 
     stages: dict[str, float] = {}
@@ -107,6 +116,8 @@ def run_and_write(config: schema.RunConfig, folder: File) -> int:
         closed_loop_figure.write(folder / "figures", extra.closed_loop, problem, name=config.name)
     if extra.study is not None:
         study_figure.write(folder / "figures", extra.study, name=config.name)
+    if extra.identification is not None:
+        identification_figure.write(folder / "figures", extra.identification, name=config.name)
     picture = None
     if extra.front is not None:
         picture = front_figure.write(folder / "figures", extra.front, name=config.name)
