@@ -77,9 +77,9 @@ class Identification:
 
     masses: pd.DataFrame
     numbers: pd.DataFrame
-    confidence: float
-    rounds: int
-    evaluations: int
+    confidence: float = 0.95
+    rounds: int = 0
+    evaluations: int = 0
 
 
 def identify(arm: Arm, config: IdentificationConfig, seed: int, workers: Workers) -> Identification:
@@ -89,9 +89,9 @@ def identify(arm: Arm, config: IdentificationConfig, seed: int, workers: Workers
     start = masses_of(arm.description)
     if len(fitted) <= len(start):
         raise ConfigError(f"identification.documents: {len(fitted)} numbers to fit for {len(start)} masses")
-    masses, evaluations = start, 0
+    masses, rounds, evaluations, settled = start, 0, 0, False
     target, sigma = (np.array([getattr(e, key) for e in fitted]) for key in ("value", "sigma"))
-    for rounds in range(1, ROUNDS + 1):
+    while not settled and rounds < ROUNDS:
         motions = _solve(_wanted(fitted), masses, seed, workers)
 
         def residuals(unknowns: Array, motions: dict[Any, Array] = motions) -> Array:
@@ -101,10 +101,8 @@ def identify(arm: Arm, config: IdentificationConfig, seed: int, workers: Workers
             return (np.array(found) - target) / sigma
 
         fit = least_squares(residuals, masses, bounds=(1e-3, np.inf), x_scale=start, diff_step=STEP, xtol=1e-7)
-        evaluations += fit.nfev
-        change, masses = np.abs(fit.x / masses - 1).max(), fit.x
-        if change < SETTLED:
-            break
+        rounds, evaluations = rounds + 1, evaluations + fit.nfev
+        settled, masses = bool(np.abs(fit.x / masses - 1).max() < SETTLED), fit.x
     # Printed numbers that fit worse than their rounding widen the intervals: s^2 is estimated where it exceeds 1.
     freedom = len(fitted) - len(masses)
     variance = max(1.0, float((fit.fun**2).sum()) / freedom)

@@ -11,9 +11,10 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from pipeline.arrays import Array
-from pipeline.artifacts import figures, front_figure, style, study_figure
+from pipeline.artifacts import figures, front_figure, identification_figure, study_figure, style
 from pipeline.candidate_study import Study
 from pipeline.evaluation import Evaluation
+from pipeline.identification import Identification
 from pipeline.reproduction import documents as kinds
 from pipeline.reproduction.recompute import recompute
 from pipeline.reproduction.results import Results
@@ -39,7 +40,13 @@ def energy_integrals(runs: Sequence[Results], labels: Sequence[str], title: str)
         usable = []
         for e in _evaluations(run, labels):
             event = e.solution.event_time
-            axes.plot(e.time, e.energy_integral, color=style.color(e.label), label=style.name(e.label))
+            line, above = ("--", 3) if e.method == "pmke" else ("-", 2)  # it hides the optimum where they coincide
+            axes.plot(
+                *(e.time, e.energy_integral, line),
+                color=style.color(e.label),
+                label=style.name(e.label),
+                zorder=above,
+            )
             usable.append(e.energy_integral[-1] if event is None else 0.0)
             if event is not None:
                 axes.axvline(event, color=figures.EVENT, linewidth=1.0, linestyle="--")
@@ -117,6 +124,12 @@ def front(runs: Sequence[Results], labels: Sequence[str], title: str) -> Figure:
     return front_figure.draw(runs[0].table("front"), title)
 
 
+def identification(runs: Sequence[Results], labels: Sequence[str], title: str) -> Figure:
+    """The residuals of every printed number under the printed and the identified masses."""
+    found = Identification(runs[0].table("masses"), runs[0].table("identification"))
+    return identification_figure.draw(found, title)
+
+
 DRAW: dict[str, Draw] = {
     **{name: partial(_of_one_run, name=name) for name in ("reference", "stroboscopic", "joints", "spectral_radius")},
     "energy_integrals": energy_integrals,
@@ -125,6 +138,7 @@ DRAW: dict[str, Draw] = {
     "joints_and_error": joints_and_error,
     "candidate_study": candidate_study,
     "front": front,
+    "identification": identification,
 }
 
 

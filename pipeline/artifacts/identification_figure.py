@@ -35,7 +35,7 @@ def draw(found: Identification, name: str) -> Figure:
         f"$m_{row['link']}$ = {row['identified']:.4f} ± {(row['high'] - row['low']) / 2:.4f}"
         for row in found.masses.to_dict("records")
     )
-    axes.set_title(f"{name}: {masses} kg", fontsize=10)
+    figure.suptitle(f"{name}: {masses} kg", fontsize=11)
     axes.grid(True, axis="x", color="0.93")
     axes.spines[["top", "right"]].set_visible(False)
     figure.legend(loc="outside lower center", ncols=3, frameon=False)

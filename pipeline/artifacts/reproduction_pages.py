@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import io
 from collections.abc import Sequence
+from functools import partial
 from html import escape
 from pathlib import Path
 
@@ -43,7 +44,7 @@ def write(folder: Path, documents: Sequence[Document], table: pd.DataFrame, runs
         own = table[table["document"] == document.name]
         pages[f"{document.name}.html"] = page(document, own, runs)
     for name, content in pages.items():
-        write_beside(folder / name, lambda file, content=content: file.write_text(content, encoding="utf-8"))
+        write_beside(folder / name, partial(Path.write_text, data=content, encoding="utf-8"))
     return [folder / name for name in pages]
 
 
@@ -104,7 +105,9 @@ def _numbers(table: pd.DataFrame, with_document: bool = False) -> str:
         words = [*words[:5], verdict, *words[6:], f"<code>{escape(str(row['command']))}</code>"]
         words[0] = f"{escape(str(row['document']))}, {words[0]}" if with_document else words[0]
         rows.append(words[first:])
-    return _table([*HEAD, "command"][first:], rows)
+    head = [*HEAD, "command"][first:]
+    shown = [column for column in range(len(head)) if any(row[column] for row in rows)]
+    return _table([head[column] for column in shown], [[row[column] for column in shown] for row in rows])
 
 
 def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

@@ -47,7 +47,7 @@ def cells(row: dict[Any, Any]) -> list[str]:
         str(row["quantity"]),
         f"{row['printed']}{unit}",
         _number(row["recomputed"]),
-        "" if pd.isna(difference) else f"{100 * difference:+.2g} %",
+        "" if pd.isna(difference) else f"{100 * difference:+.3g} %",
         str(row["verdict"]),
         _number(row["with_printed_masses"]),
         str(row["note"]),

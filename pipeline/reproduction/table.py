@@ -30,9 +30,7 @@ COLUMNS = (
 def judge(row: Row, value: float) -> str:
     """The verdict on one row whose recomputed value is known."""
     between = None if row.between is None else (row.between[0], row.between[1])
-    return verdict(
-        row.printed, value, reading=row.reading, tolerance=row.tolerance, between=between, better=row.better
-    )
+    return verdict(row.printed, value, reading=row.reading, tolerance=row.tolerance, between=between, better=row.better)
 
 
 def command(row: Row) -> str:
