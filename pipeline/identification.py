@@ -100,7 +100,7 @@ def identify(arm: Arm, config: IdentificationConfig, seed: int, workers: Workers
             found = [moved[entry.motion][1][entry.row.found.column] for entry in fitted]
             return (np.array(found) - target) / sigma
 
-        fit = least_squares(residuals, masses, bounds=(1e-3, np.inf), x_scale=start, diff_step=STEP, xtol=1e-7)
+        fit = least_squares(residuals, masses, method="lm", x_scale=start, diff_step=STEP, xtol=1e-6)
         rounds, evaluations = rounds + 1, evaluations + fit.nfev
         settled, masses = bool(np.abs(fit.x / masses - 1).max() < SETTLED), fit.x
     # Printed numbers that fit worse than their rounding widen the intervals: s^2 is estimated where it exceeds 1.
