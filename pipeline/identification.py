@@ -41,6 +41,8 @@ ROUNDS = 5  # of fits, at most, each from the optima at the masses of the one be
 SETTLED = 1e-4  # relative: masses that change less are found
 STEP = 1e-3  # relative, of the differences by the masses
 
+Key = tuple[str, str, int]  # experiment, method, optimum: one motion
+
 
 @dataclass(frozen=True)
 class Printed:
@@ -51,8 +53,7 @@ class Printed:
     row: documents.Row
 
     @property
-    def motion(self) -> tuple[str, str, int]:
-        """experiment, method, optimum."""
+    def motion(self) -> Key:
         return self.row.found.experiment, self.row.found.method, self.row.found.optimum
 
     @property
@@ -90,9 +91,13 @@ def identify(arm: Arm, config: IdentificationConfig, seed: int, workers: Workers
     if len(fitted) <= len(start):
         raise ConfigError(f"identification.documents: {len(fitted)} numbers to fit for {len(start)} masses")
     masses, rounds, evaluations, settled = start, 0, 0, False
+    before: dict[Key, Array] = {}
+    motions: dict[Key, Array] = {}
     target, sigma = (np.array([getattr(e, key) for e in fitted]) for key in ("value", "sigma"))
     while not settled and rounds < ROUNDS:
         motions = _solve(_wanted(fitted), masses, seed, workers)
+        if rounds == 0:
+            before = dict(motions)
 
         def residuals(unknowns: Array, motions: dict[Any, Array] = motions) -> Array:
             moved = _follow(motions, unknowns, workers)
@@ -117,7 +122,8 @@ def identify(arm: Arm, config: IdentificationConfig, seed: int, workers: Workers
             "high": masses + spread,
         }
     )
-    both = [_under(printed, values, seed, workers) for values in (start, masses)]
+    after = {key: q for key, (q, _) in _follow(motions, masses, workers).items()}
+    both = [_under(printed, values, known, seed, workers) for values, known in ((start, before), (masses, after))]
     return Identification(table, _residuals(printed, *both), config.confidence, rounds, evaluations)
 
 
@@ -161,7 +167,7 @@ def _printed(config: IdentificationConfig) -> list[Printed]:
     return found
 
 
-def _wanted(printed: Sequence[Printed]) -> list[tuple[str, str, int]]:
+def _wanted(printed: Sequence[Printed]) -> list[Key]:
     return list(dict.fromkeys(entry.motion for entry in printed))
 
 
@@ -178,9 +184,7 @@ def _problem(name: str, masses: Array) -> Problem:
     return replace(problem, task=PositionTask(with_masses(problem.task.arm, masses), problem.task.axes))
 
 
-def _solve(
-    wanted: Sequence[tuple[str, str, int]], masses: Array, seed: int, workers: Workers
-) -> dict[tuple[str, str, int], Array]:
+def _solve(wanted: Sequence[Key], masses: Array, seed: int, workers: Workers) -> dict[Key, Array]:
     """The motions asked for, found from nothing at these masses: (experiment, method, optimum) -> q (N + 1, n)."""
     motions = {}
     for name, method in dict.fromkeys(key[:2] for key in wanted):
@@ -200,9 +204,7 @@ def _solve(
     return motions
 
 
-def _follow(
-    motions: dict[tuple[str, str, int], Array], masses: Array, workers: Workers
-) -> dict[tuple[str, str, int], tuple[Array, dict[str, float]]]:
+def _follow(motions: dict[Key, Array], masses: Array, workers: Workers) -> dict[Key, tuple[Array, dict[str, float]]]:
     """Every motion optimised again at other masses, and its numbers."""
     items = [(*key, q) for key, q in motions.items()]
     return dict(zip(motions, workers.map(_moved, masses, items), strict=True))
@@ -232,9 +234,11 @@ def quantities(problem: Problem, q: Array) -> dict[str, float]:
     return row
 
 
-def _under(printed: Sequence[Printed], masses: Array, seed: int, workers: Workers) -> list[float]:
-    """What these masses give for every printed number, all motions found from nothing."""
-    motions = _solve(_wanted(printed), masses, seed, workers)
+def _under(
+    printed: Sequence[Printed], masses: Array, known: dict[Key, Array], seed: int, workers: Workers
+) -> list[float]:
+    """What these masses give for every printed number; motions that are not `known` at them are found from nothing."""
+    motions = known | _solve([key for key in _wanted(printed) if key not in known], masses, seed, workers)
     found = {key: quantities(_problem(key[0], masses), q) for key, q in motions.items()}
     return [found[entry.motion][entry.row.found.column] for entry in printed]
 
