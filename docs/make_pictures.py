@@ -67,7 +67,7 @@ def screenshot(recording: Path, at: float) -> Image.Image:
 
 def main() -> None:
     # Finished runs are taken as they are: after `make reproduce` this draws nothing anew.
-    subprocess.run([sys.executable, "-m", "pipeline.reproduce", "pmke", "global", "--folder", str(FOLDER)], check=True)
+    subprocess.run([sys.executable, "-m", "pipeline.reproduce", "--folder", str(FOLDER)], check=True)
     runs = FOLDER / "runs"
     names = ("traj1", "traj2", "traj3", "traj4")
     energies = energy_integrals(
