@@ -4,13 +4,16 @@ VENV := .venv
 BIN := $(VENV)/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help run test fast lint bench clean pictures
+.PHONY: help run reproduce test fast lint bench clean pictures
 
 help: ## this list
-	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 10
+	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
 
 run: $(VENV)/.installed ## set up, then run the third trajectory of the PMKE paper
 	$(BIN)/python -m pipeline +experiment=traj3
+
+reproduce: $(VENV)/.installed ## every printed number and figure of the three documents, side by side (outputs/reproduction/)
+	$(BIN)/python -m pipeline.reproduce
 
 test: $(VENV)/.installed-dev ## set up, then run the whole test suite
 	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile

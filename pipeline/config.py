@@ -419,6 +419,15 @@ class ExportConfig:
 
 
 @dataclass(frozen=True)
+class IdentificationConfig:
+    """The masses of the links from the numbers that documents print (see experiment identify_masses)."""
+
+    run: bool = switch(False)
+    documents: list[str] = choices(["pmke", "global"], "pmke", "global")
+    confidence: float = number(0.95, above=0, high=0.999)
+
+
+@dataclass(frozen=True)
 class ClosedLoopConfig:
     """Drake's Simulator follows the exported motion with a torque-limited inverse-dynamics controller."""
 
@@ -474,6 +483,7 @@ class RunConfig:
     candidate_study: CandidateStudyConfig = part(CandidateStudyConfig)
     export: ExportConfig = part(ExportConfig)
     closed_loop: ClosedLoopConfig = part(ClosedLoopConfig)
+    identification: IdentificationConfig = part(IdentificationConfig)
     published: PublishedConfig = part(PublishedConfig)
 
 

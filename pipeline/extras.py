@@ -1,4 +1,4 @@
-"""What only some runs have beside their motions: certificate, validation and convergence tables, candidate study."""
+"""What only some runs have beside their motions: certificate, validation and convergence tables, studies, masses."""
 
 from __future__ import annotations
 
@@ -7,10 +7,20 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from pipeline import candidate_study, certificate, closed_loop, convergence, front, resample, validation
+from pipeline import (
+    candidate_study,
+    certificate,
+    closed_loop,
+    convergence,
+    front,
+    identification,
+    resample,
+    validation,
+)
 from pipeline.config import ExportConfig, RunConfig
 from pipeline.costs import objective_values
 from pipeline.evaluation import LIMITS, Evaluation
+from pipeline.parallel import Workers
 from pipeline.problem import Problem, Status
 
 FEW = 4  # motions between the extremes of a front that the figures show
@@ -27,6 +37,7 @@ class Extras:
     convergence: pd.DataFrame | None = None
     exported: resample.Resampled | None = None
     closed_loop: closed_loop.ClosedLoop | None = None
+    identification: identification.Identification | None = None
 
     def shown(self, evaluations: Sequence[Evaluation]) -> list[Evaluation]:
         """The motions that figures show one by one: all of them, but of a front its extremes, its knee and a few between."""
@@ -58,7 +69,13 @@ def compute(problem: Problem, config: RunConfig, evaluations: Sequence[Evaluatio
             if chosen is not None and config.closed_loop.run
             else None
         ),
+        identification=_identified(problem, config) if config.identification.run else None,
     )
+
+
+def _identified(problem: Problem, config: RunConfig) -> identification.Identification:
+    workers = Workers(config.parallel.workers, address=config.parallel.address)
+    return identification.identify(problem.task.arm, config.identification, config.seed, workers)
 
 
 def _chosen(export: ExportConfig, evaluations: Sequence[Evaluation]) -> Evaluation | None:

@@ -10,6 +10,7 @@ from typing import Any
 
 from pipeline.config import RunConfig, WaypointsConfig
 from pipeline.prepare import find
+from pipeline.reproduction.documents import FOLDER
 from pipeline.versions import DECISIVE, versions
 
 WITHOUT_EFFECT = ("parallel", "sweep")  # groups that change no result
@@ -20,6 +21,8 @@ def inputs(config: RunConfig) -> dict[str, str]:
     files = {"robot.urdf": find(config.robot.urdf)}
     if isinstance(config.path, WaypointsConfig):
         files["path.file"] = Path(config.path.file)
+    if config.identification.run:
+        files |= {f"conf/reproduction/{name}.yaml": FOLDER / f"{name}.yaml" for name in config.identification.documents}
     return {key: hashlib.sha256(file.read_bytes()).hexdigest() for key, file in files.items()}
 
 

@@ -87,6 +87,7 @@ def run_and_write(config: schema.RunConfig, folder: File) -> int:
         export,
         figures,
         front_figure,
+        identification_figure,
         recording,
         study_figure,
         tables,
@@ -135,6 +136,8 @@ def run_and_write(config: schema.RunConfig, folder: File) -> int:
         closed_loop_figure.write(folder / "figures", extra.closed_loop, problem, name=config.name)
     if extra.study is not None:
         study_figure.write(folder / "figures", extra.study, name=config.name)
+    if extra.identification is not None:
+        identification_figure.write(folder / "figures", extra.identification, name=config.name)
     picture = None
     if extra.front is not None:
         picture = front_figure.write(folder / "figures", extra.front, name=config.name)

@@ -115,6 +115,17 @@ def text(default: str | None) -> Any:
     return _field(default, _optional(default, check))
 
 
+def texts() -> Any:
+    """A list of words."""
+
+    def check(value: Any, key: str) -> list[str]:
+        if not isinstance(value, list | tuple) or any(isinstance(word, dict | list | None) for word in value):
+            raise _fail(key, value, "must be a list of words")
+        return [str(word) for word in value]
+
+    return _field([], check)
+
+
 def numbers(
     default: Sequence[float] | None,
     *,
@@ -227,6 +238,17 @@ def table_of_numbers(value: Any, key: str) -> dict[str, float]:
 def part(kind: type) -> Any:
     """A nested dataclass."""
     return dataclasses.field(default_factory=kind, metadata={"part": kind})
+
+
+def list_of(kind: type) -> Any:
+    """A list of dataclasses."""
+
+    def check(value: Any, key: str) -> list[Any]:
+        if not isinstance(value, list | tuple):
+            raise _fail(key, value, "must be a list")
+        return [build(kind, entry, f"{key}[{i}]") for i, entry in enumerate(value)]
+
+    return _field([], check)
 
 
 def one_of(kinds: Mapping[str, type], default: str) -> Any:

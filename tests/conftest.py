@@ -13,15 +13,17 @@ import casadi as ca
 import numpy as np
 import pytest
 from hydra import compose, initialize_config_dir
+from hydra.core.global_hydra import GlobalHydra
 from hypothesis import settings
 
-from pipeline import config, urdf
+from pipeline import config, reproduce, session, urdf
 from pipeline.arm import Arm
 from pipeline.arrays import Array
 from pipeline.kinematics import project
 from pipeline.path import Line, RaisedCosine, Reference, circle, direction_vector
 from pipeline.prepare import load, prepare
 from pipeline.problem import Problem
+from pipeline.reproduction import documents
 from pipeline.session import checked
 from pipeline.task import PositionTask
 
@@ -174,3 +176,27 @@ def within_limits(arm: Arm, count: int, rng: np.random.Generator) -> Array:
     """Random configurations (count, n) inside the joint limits."""
     low = np.maximum(arm.description.lower, -np.pi)
     return rng.uniform(low, np.minimum(arm.description.upper, np.pi), size=(count, arm.n))
+
+
+@pytest.fixture(scope="session")
+def reproduced(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Every run that a printed number is found in, with fewer starts and without pictures: the folder above `runs`."""
+    from pipeline.artifacts import figures, identification_figure, recording, study_figure
+
+    folder = tmp_path_factory.mktemp("reproduced")
+    few = ("method.global.candidates=300", "method.global.optimised=16", "candidate_study.repeats=4")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("HYDRA_FULL_ERROR", "0")  # the command line sets it; this puts it back
+        patch.setattr(session, "exit_code", 0)
+        patch.setattr(sys, "argv", ["reproduce"])
+        for module in (figures, identification_figure, recording, study_figure):
+            patch.setattr(module, "write", lambda *_, **__: None)
+        for names, words in (
+            (("pmke", "global"), (*few, "identification.documents=[global]")),
+            (("pontryagin",), ("methods=[pontryagin]", "method.pontryagin.formulation=as_printed")),
+        ):
+            GlobalHydra.instance().clear()
+            wanted = dict.fromkeys(e for name in names for e in documents.read(name).experiments if e != "pareto")
+            assert reproduce.sweep(list(wanted), folder / "runs", words) == 0
+    GlobalHydra.instance().clear()
+    return folder

@@ -19,7 +19,7 @@ EXPERIMENTS = sorted(file.stem for file in (CONF / "experiment").glob("*.yaml"))
 OPTIONS = sorted(
     f"{file.parent.name}={file.stem}"
     for file in CONF.glob("*/*.yaml")
-    if file.parent.name not in ("experiment", "method")
+    if file.parent.name not in ("experiment", "method", "reproduction")
 )
 METHODS = sorted(file.stem for file in (CONF / "method").glob("*.yaml"))
 

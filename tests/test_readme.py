@@ -1,4 +1,4 @@
-"""The README is true: its Python runs, its commands are accepted, its files exist."""
+"""The README and the guides are true: its Python runs, its commands are accepted, its files exist."""
 
 from __future__ import annotations
 
@@ -13,11 +13,15 @@ from pipeline import inspect, run, session
 from pipeline.__main__ import CONF
 
 ROOT = Path(__file__).resolve().parent.parent
-TEXTS = {name: (ROOT / name).read_text(encoding="utf-8") for name in ("README.md", "docs/errata.md")}
+TEXTS = {name: (ROOT / name).read_text(encoding="utf-8") for name in ("README.md", "docs/errata.md", "docs/tour.md")}
 COMMANDS = sorted(
-    {line.split("  ")[0] for text in TEXTS.values() for line in re.findall(r"python -m pipeline(?!\.)([^`\n]*)", text)}
+    {
+        line.split("  ")[0]
+        for text in TEXTS.values()
+        for line in re.findall(r"python -m pipeline(?![.\w])([^`\n]*)", text)
+    }
 )
-INSPECTED = sorted(set(re.findall(r"python -m pipeline\.inspect([^`\n]*)", TEXTS["README.md"])))
+INSPECTED = sorted(set(re.findall(r"python -m pipeline\.inspect([^`\n]*)", "\n".join(TEXTS.values()))))
 
 
 def _values(word: str) -> list[str]:
@@ -60,11 +64,12 @@ def test_python_example_runs(capsys: pytest.CaptureFixture[str], monkeypatch: py
 @pytest.mark.parametrize("name", TEXTS)
 def test_files_named_exist(name: str) -> None:
     named = re.findall(r"`((?:pipeline|conf|docs|tests|robots)/[\w/.]*)`", TEXTS[name])
-    pictures = re.findall(r"\]\((docs/[\w.]+)\)", TEXTS[name])
-    assert all((ROOT / file).exists() for file in named + pictures)
+    pictures = re.findall(r"\]\(([\w/]+\.png)\)", TEXTS[name])
+    assert all((ROOT / file).exists() for file in named)
+    assert all(((ROOT / name).parent / file).exists() for file in pictures)
     assert named
 
 
 def test_make_targets_exist() -> None:
     targets = set(re.findall(r"^(\w+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.M))
-    assert set(re.findall(r"(?<=make )(?:run|test|help|bench)", TEXTS["README.md"])) <= targets
+    assert set(re.findall(r"(?<=make )(?:run|test|help|bench|reproduce)", "".join(TEXTS.values()))) <= targets

@@ -245,6 +245,12 @@ def markdown(
     if extras.convergence is not None:
         lines += ["", "## Planner on finer grids, against the extremal of the maximum principle", ""]
         lines += markdown_table(_cells(extras.convergence))
+    if extras.identification is not None:
+        found = extras.identification
+        lines += ["", f"## Masses [kg], with intervals of {found.confidence:.0%} confidence", ""]
+        lines += markdown_table(_cells(found.masses))
+        lines += ["", "## What the printed and the identified masses give (residuals in units of the rounding)", ""]
+        lines += markdown_table(_cells(found.numbers))
     if extras.exported is not None:
         lines += ["", f"Exported: {resample.sentence(extras.exported)}."]
     elif config.export.method == "best":
@@ -314,7 +320,7 @@ def _cell(value: Any) -> str:
 
 
 def write(folder: Path, evaluations: Sequence[Evaluation], table: pd.DataFrame, text: str, extras: Extras) -> None:
-    """summary.csv, summary.md, trajectories.parquet, and validation.csv and candidate_study.csv where they exist."""
+    """summary.csv, summary.md, trajectories.parquet, and the tables of what only some runs have."""
     if extras.validation is not None:
         validation = extras.validation
         write_beside(folder / "validation.csv", lambda file: validation.to_csv(file, index=False))
@@ -327,6 +333,10 @@ def write(folder: Path, evaluations: Sequence[Evaluation], table: pd.DataFrame, 
     if extras.study is not None:
         curve = pd.DataFrame({"candidates": extras.study.count, "distance": extras.study.distance})
         write_beside(folder / "candidate_study.csv", lambda file: curve.to_csv(file, index=False))
+    if extras.identification is not None:
+        found = extras.identification
+        write_beside(folder / "masses.csv", lambda file: found.masses.to_csv(file, index=False))
+        write_beside(folder / "identification.csv", lambda file: found.numbers.to_csv(file, index=False))
     write_beside(folder / "summary.csv", lambda file: table.to_csv(file, index=False))
     write_beside(folder / "summary.md", lambda file: file.write_text(text, encoding="utf-8"))
     write_beside(folder / "trajectories.parquet", lambda file: trajectories(evaluations).to_parquet(file, index=False))
