@@ -48,7 +48,7 @@ def test_arms_are_inspected(command: str) -> None:
 
 def test_every_module_that_is_called_is_checked() -> None:
     called = {name for text in TEXTS.values() for name in re.findall(r"python -m (pipeline[\w.]*)", text)}
-    assert called == {"pipeline", "pipeline.inspect"}
+    assert called == {"pipeline", "pipeline.inspect", "pipeline.reproduce"}  # the last: test_reproduction.py
 
 
 def test_python_example_runs(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
