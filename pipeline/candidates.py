@@ -99,7 +99,7 @@ def ranking(problem: Problem, times: Array, motions: Array, limit_weight: float)
     cost = objective_values(problem, times, motions)
     limited = np.isfinite(span)
     if limited.any():
-        middle = (limits.upper + limits.lower)[limited] / 2
+        middle = (limits.upper[limited] + limits.lower[limited]) / 2
         distance = ((motions[:, :, limited] - middle) / span[limited]) ** 2
         cost = cost + limit_weight * distance.sum(axis=(1, 2)) / motions.shape[2]
     return cost
