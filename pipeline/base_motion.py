@@ -75,21 +75,21 @@ class BasePlant:
         first = self.root.floating_velocities_start_in_v()
         self.base, self.joints = np.arange(first, first + 6), [joint.velocity_start() for joint in joints]
         self.places = [joint.position_start() for joint in joints]
-        self.start = Rotation.from_euler("xyz", fixed.base_rpy), fixed.base_position
+        self.floating = np.arange(7) + self.root.floating_positions_start()  # w, x, y, z and the position
+        self.start = Rotation.from_euler("xyz", fixed.base_rpy).as_quat(), fixed.base_position
 
-    def at(self, position: Array, rotation: Rotation, q: Array, velocity: Array) -> None:
-        """velocity (6 + joints,): [w, v, qd_m]."""
-        x, v = self.plant.GetPositions(self.context).copy(), np.empty(6 + len(q))
+    def at(self, position: Array, quaternion: Array, q: Array, velocity: Array) -> None:
+        """quaternion (4,), last component real. velocity (6 + joints,): [w, v, qd_m]."""
+        x, v = np.empty(7 + len(q)), np.empty(6 + len(q))
+        x[self.floating[0]], x[self.floating[1:4]], x[self.floating[4:]] = quaternion[3], quaternion[:3], position
         x[self.places] = q
         v[self.base], v[self.joints] = velocity[:6], velocity[6:]
         self.plant.SetPositions(self.context, x)
-        pose = RigidTransform(RotationMatrix(rotation.as_matrix()), position)
-        self.plant.SetFreeBodyPose(self.context, self.root, pose)
         self.plant.SetVelocities(self.context, v)
 
-    def follow(self, position: Array, rotation: Rotation, q: Array, qd: Array, momentum: Array) -> Array:
+    def follow(self, position: Array, quaternion: Array, q: Array, qd: Array, momentum: Array) -> Array:
         """[w, v] (6,) of the base at which the system has `momentum` (6,): linear, and angular about the start."""
-        self.at(position, rotation, q, np.concatenate([np.zeros(6), qd]))
+        self.at(position, quaternion, q, np.concatenate([np.zeros(6), qd]))
         inertia = np.asarray(self.plant.CalcMassMatrix(self.context))
         angular = momentum[3:] - np.cross(position - self.start[1], momentum[:3])
         wanted = np.concatenate([angular, momentum[:3]]) - inertia[np.ix_(self.base, self.joints)] @ qd
@@ -102,8 +102,8 @@ class BasePlant:
 
     def reaction(self, q: Array, qd: Array, qdd: Array) -> Array:
         """Force [N] and torque [N m] (6,), about the root link's origin in the world, that hold the base still."""
-        rotation, position = self.start
-        self.at(position, rotation, q, np.concatenate([np.zeros(6), qd]))
+        quaternion, position = self.start
+        self.at(position, quaternion, q, np.concatenate([np.zeros(6), qd]))
         rates = np.zeros(6 + len(q))
         rates[self.joints] = qdd
         tau = self.plant.CalcInverseDynamics(self.context, rates, self.forces)
@@ -128,55 +128,62 @@ def integrate(problem: Problem, arm: FloatingArm, time: Array, q: Array) -> Floa
     joints = CubicSpline(time, q)
     parts = max(LEAST, -(-STEPS // (len(time) - 1)))
     fine = np.interp(np.arange(parts * (len(time) - 1) + 1) / parts, np.arange(len(time)), time)
-    rotation, position = plant.start
-    positions, rotations = [position], [rotation]
+    quaternion, position = plant.start
+    states = [np.concatenate([quaternion, position])]
 
-    def rate(t: float, position: Array, rotation: Rotation) -> Array:
-        return plant.follow(position, rotation, joints(t), joints(t, 1), momentum)
+    def rate(state: Array, q: Array, qd: Array) -> Array:
+        unit = state[:4] / np.sqrt(state[:4] @ state[:4])
+        both = plant.follow(state[4:], unit, q, qd, momentum)
+        (wx, wy, wz), (x, y, z, r) = both[:3], state[:4]
+        # dq/dt = (w, 0) q / 2 for an angular velocity w in the world.
+        turned = (
+            wx * r + wy * z - wz * y,
+            wy * r + wz * x - wx * z,
+            wz * r + wx * y - wy * x,
+            -wx * x - wy * y - wz * z,
+        )
+        return np.concatenate([np.multiply(turned, 0.5), both[3:]])
 
-    for t, h in zip(fine[:-1], np.diff(fine), strict=True):
-        # RK4 on the turn phi since t: dphi/dt = w to the order that counts (phi is small within a step), by its series.
-        slopes: list[Array] = []
-        for ahead in (0.0, 0.5, 0.5, 1.0):
-            turn, move = (ahead * h * slopes[-1][:3], ahead * h * slopes[-1][3:]) if slopes else (np.zeros(3),) * 2
-            both = rate(t + ahead * h, position + move, Rotation.from_rotvec(turn) * rotation)
-            # d(phi)/dt = w - phi x w / 2 + phi x (phi x w) / 12 for an angular velocity w in the world.
-            w = both[:3] - np.cross(turn, both[:3]) / 2 + np.cross(turn, np.cross(turn, both[:3])) / 12
-            slopes.append(np.concatenate([w, both[3:]]))
-        mean = (slopes[0] + 2 * slopes[1] + 2 * slopes[2] + slopes[3]) / 6
-        rotation, position = Rotation.from_rotvec(h * mean[:3]) * rotation, position + h * mean[3:]
-        positions.append(position)
-        rotations.append(rotation)
-    return _check(problem, plant, fine, np.array(positions), Rotation.concatenate(rotations), joints, momentum)
+    middle = (fine[1:] + fine[:-1]) / 2
+    (at, at_rate), (half, half_rate) = ((joints(t), joints(t, 1)) for t in (fine, middle))
+    for i, h in enumerate(np.diff(fine)):
+        state = states[-1]
+        k1 = rate(state, at[i], at_rate[i])
+        k2 = rate(state + h / 2 * k1, half[i], half_rate[i])
+        k3 = rate(state + h / 2 * k2, half[i], half_rate[i])
+        k4 = rate(state + h * k3, at[i + 1], at_rate[i + 1])
+        state = state + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+        state[:4] /= np.sqrt(state[:4] @ state[:4])
+        states.append(state)
+    found = np.array(states)
+    return _check(problem, plant, fine, found[:, 4:], found[:, :4], joints, momentum)
 
 
 def _check(
-    problem: Problem, plant: BasePlant, time: Array, position: Array, rotation: Rotation, joints: Any, momentum: Array
+    problem: Problem, plant: BasePlant, time: Array, position: Array, quaternion: Array, joints: Any, momentum: Array
 ) -> Floating:
-    """The momentum of the integrated motion half-way between its steps, from splines through it."""
-    quaternion = rotation.as_quat()
-    quaternion[1:] *= np.cumprod(np.where((quaternion[1:] * quaternion[:-1]).sum(axis=1) < 0, -1.0, 1.0))[:, None]
+    """The momentum of the integrated motion half-way between its steps, from splines through it; continuous quaternions."""
     moved, turned = CubicSpline(time, position), CubicSpline(time, quaternion)
     middle = (time[1:] + time[:-1]) / 2
-    places, ways = moved(middle), Rotation.from_quat(turned(middle))
-    velocity, angular = moved(middle, 1), _angular_velocity(turned(middle), turned(middle, 1))
+    places, ways, q, qd = moved(middle), turned(middle), joints(middle), joints(middle, 1)
+    velocity, angular = moved(middle, 1), _angular_velocity(ways, turned(middle, 1))
+    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
     error, own = np.empty((len(middle), 6)), np.empty((len(middle), 6))
-    for i, t in enumerate(middle):
-        qd = joints(t, 1)
-        plant.at(places[i], ways[i], joints(t), np.concatenate([angular[i], velocity[i], qd]))
+    for i in range(len(middle)):
+        plant.at(places[i], ways[i], q[i], np.concatenate([angular[i], velocity[i], qd[i]]))
         error[i] = plant.momentum() - momentum
-        plant.at(places[i], ways[i], joints(t), np.concatenate([np.zeros(6), qd]))
+        plant.at(places[i], ways[i], q[i], np.concatenate([np.zeros(6), qd[i]]))
         own[i] = plant.momentum()
     linear, angular_error = (
         float(np.linalg.norm(error[:, part], axis=1).max() / max(np.linalg.norm(own[:, part], axis=1).max(), 1e-300))
         for part in (slice(3), slice(3, 6))
     )
-    target, rows = problem.reference.position(time), problem.task.rows
+    target, rows, q = problem.reference.position(time), problem.task.rows, joints(time)
     off = np.empty(len(time))
-    for i, t in enumerate(time):
-        plant.at(position[i], rotation[i], joints(t), np.zeros(6 + joints(t).size))
+    for i in range(len(time)):
+        plant.at(position[i], quaternion[i], q[i], np.zeros(6 + q.shape[1]))
         off[i] = np.linalg.norm(plant.tip()[rows] - target[i, : len(rows)])
-    return Floating(time, position, rotation, linear, angular_error, float(off.max()))
+    return Floating(time, position, Rotation.from_quat(quaternion), linear, angular_error, float(off.max()))
 
 
 def _angular_velocity(quaternion: Array, rate: Array) -> Array:

@@ -113,7 +113,9 @@ def test_momentum_that_is_given_is_kept() -> None:
     assert max(e.base.floating.linear, e.base.floating.angular) < 1e-6
     plant, last = BasePlant(problem.task.arm), e.base.floating
     rest = np.zeros(3)
-    moving = plant.follow(last.position[0], last.rotation[0], e.q[0], rest, np.array([0.05, 0, 0, 0, 0, 0.02]))
+    moving = plant.follow(
+        last.position[0], last.rotation[0].as_quat(), e.q[0], rest, np.array([0.05, 0, 0, 0, 0, 0.02])
+    )
     assert np.abs(moving).max() > 1e-3  # before the joints move, the base does
 
 

@@ -77,7 +77,7 @@ def free_state(arm: FloatingArm, q: Array, qd: Array) -> tuple[BasePlant, Array]
     position, rotation = pose(arm, q)
     (ahead, turned), (behind, back) = pose(arm, q + h * qd), pose(arm, q - h * qd)
     velocity = np.concatenate([(turned * back.inv()).as_rotvec(), ahead - behind]) / (2 * h)
-    plant.at(position, rotation, q[nb:], np.concatenate([velocity, qd[nb:]]))
+    plant.at(position, rotation.as_quat(), q[nb:], np.concatenate([velocity, qd[nb:]]))
     return plant, velocity
 
 
@@ -104,7 +104,7 @@ def test_motion_conserves_the_momentum_it_should(arm: FloatingArm, rng: np.rando
         position, rotation = pose(arm, q[i])
         wanted = free.follow(
             position,
-            rotation,
+            rotation.as_quat(),
             q[i, arm.base_coordinates :],
             qd[i, arm.base_coordinates :],
             np.array(arm.spacecraft.momentum),
