@@ -166,6 +166,8 @@ def test_the_planner_gives_the_same_as_here(two_workers: Cluster, tmp_path: Path
 
 def test_a_killed_worker_loses_nothing(two_workers: Cluster, tmp_path: Path) -> None:
     victim = two_workers.begin_worker()
+    with Client(two_workers.address, set_as_default=False) as client:
+        client.wait_for_workers(3, timeout=60)
     items = [float(item) for item in range(36) if item != 13]
     killed: list[int] = []
 
