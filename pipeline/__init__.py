@@ -17,7 +17,10 @@ for _variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 
 _PUBLIC = {
     "Arm": "pipeline.arm",
+    "FloatingArm": "pipeline.floating",
+    "Spacecraft": "pipeline.floating",
     "PositionTask": "pipeline.task",
+    "PoseTask": "pipeline.task",
     "Line": "pipeline.path",
     "Arc": "pipeline.path",
     "Spline": "pipeline.path",
