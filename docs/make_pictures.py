@@ -78,6 +78,10 @@ def main() -> None:
     small(Image.open(content), DOCS / "energy.png")
     small(Image.open(runs / "traj3" / "figures" / "stroboscopic.png"), DOCS / "stroboscopic.png")
     small(Image.open(runs / "pareto" / "figures" / "front.png"), DOCS / "front.png")
+    floating = FOLDER.parent / "floating3r"
+    run = [sys.executable, "-m", "pipeline", "+experiment=floating3r", f"hydra.run.dir={floating}"]
+    subprocess.run(run, check=True)
+    small(Image.open(floating / "figures" / "stroboscopic.png"), DOCS / "floating.png")
     small(screenshot(runs / "traj3" / "recording.rrd", 4.0), DOCS / "recording.png")
 
 
