@@ -174,6 +174,7 @@ def test_heavy_bases_are_fixed_ones_in_the_limit() -> None:
     """Energies differ from the fixed base's in proportion to 1 / mass, the base turns in proportion to it."""
     words = (
         *SHORT,
+        "method.global.optimised=2",
         "path.length=0.2",
         "timing.steps=25",
         "method.pmke.prediction_step=0.8",
