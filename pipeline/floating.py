@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -140,6 +141,47 @@ class FloatingArm(Arm):
             for j, unit in enumerate(np.eye(self.n)[:nb]):
                 by_q[:, :, j] -= (self.momentum(q + STEP * unit) - self.momentum(q - STEP * unit)) / (2 * STEP)
         return value, by_q, self.mass_matrix(q)[:, :nb]
+
+    def mean_momentum_residual(self, q: Array, qd: Array, dt: Array) -> tuple[Array, Array, Array]:
+        """The same (K, base coordinates) over intervals dt (K,) from q at constant qd, with derivatives by q and by qd.
+
+        Linear momentum by how far the centre of mass has moved: exact, so that a cycle of the joints brings it back to
+        where it was. Angular momentum has no such integral: it is taken in the middle, which is of second order in dt.
+        """
+        half, step = dt[:, None, None] / 2, dt[:, None, None]
+        value, by_q, by_qd = self.momentum_residual(q + half[:, 0] * qd, qd)
+        by_qd = by_qd + half * by_q
+        (before, by_before), (after, by_after) = self.center_of_mass(q), self.center_of_mass(q + step[:, 0] * qd)
+        linear, mass = slice(before.shape[1]), self.mass
+        value[:, linear] = mass * (after - before) / step[:, 0] - self._linear[linear]
+        by_q[:, linear] = mass * (by_after - by_before) / step
+        by_qd[:, linear] = mass * by_after
+        return value, by_q, by_qd
+
+    @cached_property
+    def mass(self) -> float:
+        """Of the whole system [kg]."""
+        return float(self.mass_matrix(np.zeros((1, self.n)))[0, 0, 0])
+
+    def center_of_mass(self, q: Array) -> tuple[Array, Array]:
+        """The whole system's (K, 2 or 3) [m] in the frame in which the base starts, and its derivative (K, 2 or 3, n).
+
+        Both stand in the inertia matrix: the linear momentum of a turn about the axis a is m a x (c - r).
+        """
+        inertia = self.mass_matrix(q)
+        count = 2 if self.planar else 3
+        by_q = inertia[:, :count] / inertia[:, :1, :1]
+        center = q[:, :count].copy()
+        center[:, 0] += by_q[:, 1, count]
+        center[:, 1] -= by_q[:, 0, count]
+        if not self.planar:
+            center[:, 2] += np.cos(q[:, 3]) * by_q[:, 0, 4] + np.sin(q[:, 3]) * by_q[:, 1, 4]
+        return center, by_q
+
+    @property
+    def center_rests(self) -> bool:
+        """Whether the centre of mass of the whole system stays where it is."""
+        return self.floats and not np.any(self._linear)
 
     # --- attitude -----------------------------------------------------------------------------------------------
 

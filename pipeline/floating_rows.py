@@ -6,20 +6,27 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import null_space
 
 from pipeline.arrays import Array
 from pipeline.differentiable import DifferentiableConstraint
 from pipeline.floating import FloatingArm
 
 if TYPE_CHECKING:
-    from pipeline.transcription import Transcription
+    from pipeline.transcription import Rate, Transcription
 
+DEPENDENT = 1e-6  # relative: a singular value below it is zero
 Block = NDArray[np.int_]
 
 
 def conserve_momentum(made: Transcription, arm: FloatingArm, block: Block) -> None:
-    """M_b qd_i = p at the middle of every interval, q_(i-1) + dt_i / 2 qd_i: of second order in the step."""
-    _momentum_rows(made, arm, made.y[block], made.w[block], block, made.dt[block] / 2)
+    """M_b qd_i = p over every interval from q_(i-1): exact for linear momentum, of second order for angular."""
+    dt = made.dt[block]
+
+    def residual(q: Array, qd: Array) -> tuple[Array, Array, Array]:
+        return arm.mean_momentum_residual(q, qd, dt)
+
+    _momentum_rows(made, arm, residual, made.y[block], made.w[block], block)
 
 
 def enter(made: Transcription, arm: FloatingArm) -> None:
@@ -29,11 +36,33 @@ def enter(made: Transcription, arm: FloatingArm) -> None:
     both = np.hstack([joints, -joints])
     unknowns = np.concatenate([made.w_entry[0], made.w[-1]])
     made.program.AddLinearEqualityConstraint(both, np.zeros(len(joints)), unknowns)
-    _momentum_rows(made, arm, made.y[:1], made.w_entry, last, np.zeros(1))
+    _momentum_rows(made, arm, arm.momentum_residual, made.y[:1], made.w_entry, last)
 
 
-def _momentum_rows(made: Transcription, arm: FloatingArm, y: Any, w: Any, intervals: Block, ahead: Array) -> None:
-    """M_b qd = p `ahead` [s] of the positions y, each row divided by M_bb of the guess and the size of its velocity."""
+def close_path(made: Transcription, arm: FloatingArm) -> None:
+    """The last knot of a cycle whose centre of mass rests: all that the system can have done is to turn about it.
+
+    Of the tracking error as many combinations are rows as such turns can change; the others, like the distance from
+    the centre, are met already, and as rows they would leave the multipliers undetermined.
+    """
+    task, target, q = made.problem.task, made.x_ref[-1:], made.q_guess[-1:]
+    turns = null_space(arm.center_of_mass(q)[1][0, :, : made.nb])
+    directions, sizes, _ = np.linalg.svd(task.error_and_jacobian(q, target)[1][0, :, : made.nb] @ turns)
+    across = directions[:, : len(sizes)][:, sizes > DEPENDENT * max(sizes.max(), 1e-300)].T
+    count, scale = len(across), made.position_scale
+
+    def closing(x: Array) -> tuple[Array, Array]:
+        error, jacobian = task.error_and_jacobian(x[None] / scale, target)
+        return across @ error[0], across @ jacobian[0] / scale
+
+    pattern = [(i, j) for i in range(count) for j in range(made.n)]
+    made.add_rows(closing, np.zeros(count), made.y[-1], pattern)
+
+
+def _momentum_rows(made: Transcription, arm: FloatingArm, residual: Rate, y: Any, w: Any, intervals: Block) -> None:
+    """The residual of the positions y and velocities w is zero: each row divided by M_bb of the guess and the size of its
+    velocity.
+    """
     nb, n, count = made.nb, made.n, len(intervals)
     rate = made.to_velocity[intervals]
     size = np.abs(rate[:, :nb]).max(axis=2)
@@ -42,11 +71,10 @@ def _momentum_rows(made: Transcription, arm: FloatingArm, y: Any, w: Any, interv
 
     def momentum(x: Array) -> tuple[Array, Array]:
         qd = (rate @ x[split:].reshape(count, n, 1))[:, :, 0]
-        q = x[:split].reshape(count, n) / made.position_scale + ahead[:, None] * qd
-        value, by_q, by_qd = arm.momentum_residual(q, qd)
+        value, by_q, by_qd = residual(x[:split].reshape(count, n) / made.position_scale, qd)
         rows = np.zeros((count, nb, 2 * count, n))
         rows[diagonal, :, diagonal] = weight @ by_q / made.position_scale
-        rows[diagonal, :, count + diagonal] = weight @ (by_qd + ahead[:, None, None] * by_q) @ rate
+        rows[diagonal, :, count + diagonal] = weight @ by_qd @ rate
         return (weight @ value[:, :, None]).ravel(), rows.reshape(count * nb, -1)
 
     pattern = [

@@ -93,8 +93,11 @@ class Transcription:
         self._limit()
         first_free = 1 if problem.boundary is Boundary.FIXED else 0
         # Closed joints close the path, unless the base has moved under them.
-        for block in self.blocks(first_free, self.intervals + (0 if closed and not self.arm.floats else 1)):
+        turns = closed and isinstance(self.arm, FloatingArm) and self.arm.center_rests
+        for block in self.blocks(first_free, self.intervals + (0 if turns or (closed and not self.arm.floats) else 1)):
             self._add_tracking(block)
+        if turns and isinstance(self.arm, FloatingArm):
+            floating_rows.close_path(self, self.arm)
         for block in self.blocks(0, self.intervals):
             if self.lagrangian.is_quadratic and not elastic:
                 self._add_quadratic(block)

@@ -59,6 +59,8 @@ def test_momentum_and_path_of_the_planner(start: str) -> None:
     assert e.tracking_error.max() < 1e-8
     if start == "cyclic":
         assert np.abs(e.q[-1] - e.q[0]).max() < 1e-9
+        # In the plane closed joints and a closed path leave the base no choice but to come back too.
+        assert e.base.turn[-1] < 1e-7
     # The base that the solver found at its knots is the one that the joints alone bring about.
     last = e.base.floating
     np.testing.assert_allclose(last.position[-1], e.base.position[-1], atol=1e-4)
@@ -153,6 +155,34 @@ def test_an_attitude_that_is_exceeded_is_named() -> None:
     relaxed = least_violation(bounded, problem.times, [solution.trajectory.q])
     assert relaxed is not None
     assert relaxed.feasible  # there is a way to turn less
+
+
+def test_a_fine_grid_does_not_make_a_cycle_harder() -> None:
+    """Closed joints leave the base turns about the centre of mass alone: rows that these cannot change must not be there."""
+    _, solution = stated(*ON_BASE, *CIRCLE, "timing.steps=100", "method.global.optimised=2")
+    assert solution.status is Status.SOLVED, solution.message
+    assert solution.statistics["solves"][-1]["iterations"] < 30
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("orientation", ["none", "full"])
+def test_cycles_in_space(orientation: str) -> None:
+    """Closed joints and position leave the base one turn, about the line from the centre of mass to the end effector."""
+    words = ("robot=panda", "base=free", "base.mass=60", "base.inertia=4.9", "base.com=[0,0,-0.35]", *CIRCLE)
+    around = ("path.center_direction=[0,1,0]", "path.normal=[1,0,0]", f"robot.orientation={orientation}")
+    e = solved(
+        *words,
+        *around,
+        "timing.duration=4",
+        "timing.steps=24",
+        "method.global.candidates=40",
+        "method.global.optimised=2",
+    )[1]
+    assert e.status is Status.SOLVED, e.message
+    assert np.abs(e.q[-1] - e.q[0]).max() < 1e-9
+    assert e.base.turn.max() > 1e-3
+    if orientation == "full":
+        assert e.base.turn[-1] < 1e-6
 
 
 @pytest.mark.slow

@@ -162,6 +162,30 @@ def test_derivatives_equal_central_differences(arm: FloatingArm, rng: np.random.
         assert velocity[:3] @ velocity[:3] == pytest.approx(value[i], rel=1e-6)
 
 
+def test_center_of_mass_and_mean_momentum(arm: FloatingArm, rng: np.random.Generator) -> None:
+    """The centre is Drake's; over an interval the linear momentum is what moves it, the angular one that of the middle."""
+    q, qd = states(arm, 3, rng)
+    dt, h = np.array([0.1, 0.2, 0.3]), 1e-5
+    center, _ = arm.center_of_mass(q)
+    count, mount = center.shape[1], Rotation.from_euler("xyz", arm.base_rpy)
+    value, by_q, by_qd = arm.mean_momentum_residual(q, qd, dt)
+    after = arm.center_of_mass(q + dt[:, None] * qd)[0]
+    linear = mount.inv().apply(arm.spacecraft.momentum[:3])[:count]
+    np.testing.assert_allclose(value[:, :count], arm.mass * (after - center) / dt[:, None] - linear, atol=1e-11)
+    middle = arm.momentum_residual(q + dt[:, None] / 2 * qd, qd)[0]
+    np.testing.assert_allclose(value[:, count:], middle[:, count:], atol=1e-11)
+    for i in range(3):
+        free, _ = free_state(arm, q[i], qd[i])
+        seen = mount.inv().apply(free.plant.CalcCenterOfMassPositionInWorld(free.context) - arm.base_position)
+        np.testing.assert_allclose(center[i], seen[:count], atol=1e-10)
+        assert arm.mass == pytest.approx(free.plant.CalcTotalMass(free.context), rel=1e-12)
+    scale = 1 + np.abs(by_q).max() + np.abs(by_qd).max()
+    for j, unit in enumerate(np.eye(arm.n)):
+        for at, got in (((h * unit, 0.0), by_q), ((0.0, h * unit), by_qd)):
+            ahead, behind = (arm.mean_momentum_residual(q + sign * at[0], qd + sign * at[1], dt)[0] for sign in (1, -1))
+            np.testing.assert_allclose(got[:, :, j], (ahead - behind) / (2 * h), atol=1e-7 * scale)
+
+
 def test_planar_or_not() -> None:
     assert is_planar(robot("planar3r"), PLATE)
     assert is_planar(robot("planar3r_base"), Spacecraft())
