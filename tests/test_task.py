@@ -68,7 +68,7 @@ def test_second_derivatives(task: Task, rng: np.random.Generator) -> None:
 
 def test_velocity_and_acceleration_of_a_target_that_the_arm_itself_draws(task: Task, rng: np.random.Generator) -> None:
     """For any joint motion, J qd and J qdd + Jd qd are what a target asks for that moves as its end effector does."""
-    q, (qd, qdd), h = within_limits(task.arm, 10, rng), rng.normal(size=(2, 10, task.arm.n)), 1e-4
+    q, (qd, qdd) = within_limits(task.arm, 10, rng), rng.normal(size=(2, 10, task.arm.n))
     if isinstance(task, PositionTask):
         rate = (task.jacobian(q) @ qd[:, :, None])[:, :, 0]
         wanted = (task.jacobian(q) @ qdd[:, :, None])[:, :, 0] + task.jacobian_rate_term(q, qd)
@@ -87,7 +87,6 @@ def test_velocity_and_acceleration_of_a_target_that_the_arm_itself_draws(task: T
     np.testing.assert_allclose(task.velocity(q, turned), (task.jacobian(q) @ qd[:, :, None])[:, :, 0], atol=1e-12)
     left = (task.jacobian(q) @ qdd[:, :, None])[:, :, 0] + task.jacobian_rate_term(q, qd)
     np.testing.assert_allclose(task.acceleration(q, qd, turned, pushed), left, atol=1e-10)
-    assert h > 0
 
 
 vectors = st.tuples(*[st.floats(-1, 1)] * 3).map(np.array).filter(lambda v: np.linalg.norm(v) > 0.05)
