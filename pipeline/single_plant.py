@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from pipeline.arm import Arm
 from pipeline.arrays import Array
+from pipeline.floating import FloatingArm
 from pipeline.problem import Problem
 from pipeline.task import PositionTask, Task
 
@@ -95,8 +96,11 @@ class SinglePlant:
 
     def drift(self) -> Array:
         """The velocities (N,) of a floating base whose system has momentum, its joints at rest."""
-        q = np.asarray(self.plant.GetPositions(self.context))[self.order]
-        return self.arm.follow(q[None], np.zeros((1, len(q))))[0]
+        q, out = np.asarray(self.plant.GetPositions(self.context))[self.order], np.zeros(len(self.order))
+        if isinstance(self.arm, FloatingArm) and self.arm.floats:
+            inertia = self.mass_matrix()[: self.nb, : self.nb]
+            out[: self.nb] = np.linalg.solve(inertia, self.arm.momentum(q[None])[0])
+        return out
 
     def secondary(self, problem: Problem, q: Array) -> float:
         """w at q (n,): Pontryagin report eqs (14), (15), the latter with its square."""

@@ -20,6 +20,7 @@ from pipeline.arrays import Array
 from pipeline.base_motion import BasePlant
 from pipeline.floating import FloatingArm, Spacecraft, is_planar
 from pipeline.prepare import load
+from pipeline.single_plant import SinglePlant
 
 CRAFT = Spacecraft(12.0, ((0.9, 0.1, 0.0), (0.1, 0.8, -0.05), (0.0, -0.05, 0.7)), (0.05, -0.02, -0.1))
 PLATE = Spacecraft(8.0, ((0.3, 0.0, 0.0), (0.0, 0.3, 0.0), (0.0, 0.0, 0.5)), (-0.1, 0.05, 0.0))
@@ -110,6 +111,16 @@ def test_motion_conserves_the_momentum_it_should(arm: FloatingArm, rng: np.rando
             np.array(arm.spacecraft.momentum),
         )
         np.testing.assert_allclose(wanted, velocity, atol=1e-7)
+
+
+def test_the_evaluations_own_plant_says_the_same(arm: FloatingArm, rng: np.random.Generator) -> None:
+    """What a motion of the joints does to the base, from a plant that holds one arm only."""
+    plant, (q, qd) = SinglePlant(arm), states(arm, 4, rng)
+    moving = arm.follow(q, qd)
+    for i in range(len(q)):
+        plant.at(q[i], qd[i])
+        own = plant.motion_map() @ qd[i, arm.base_coordinates :] + plant.drift()
+        np.testing.assert_allclose(own, moving[i], atol=1e-10)
 
 
 def test_generalized_jacobian_and_reduced_inertia(arm: FloatingArm, rng: np.random.Generator) -> None:
