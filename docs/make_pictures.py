@@ -13,9 +13,9 @@ from pathlib import Path
 
 from PIL import Image
 
-from pipeline.artifacts.document_figures import energy_integrals
-from pipeline.reproduce import FOLDER
-from pipeline.reproduction.results import Results
+from pipeline.reproduce.__main__ import FOLDER
+from pipeline.reproduce.drawings import energy_integrals
+from pipeline.reproduce.results import Results
 
 DOCS = Path(__file__).resolve().parent
 WIDTH, COLORS = 1200, 128

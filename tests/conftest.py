@@ -4,36 +4,29 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
-from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
 
 import casadi as ca
 import numpy as np
 import pytest
-from hydra import compose, initialize_config_dir
 from hydra.core.global_hydra import GlobalHydra
 from hypothesis import settings
 
-from pipeline import config, reproduce, session, urdf
-from pipeline.arm import Arm
-from pipeline.arrays import Array
-from pipeline.kinematics import project
-from pipeline.path import Line, RaisedCosine, Reference, circle, direction_vector
-from pipeline.prepare import load, prepare
-from pipeline.problem import Problem
-from pipeline.reproduction import documents
-from pipeline.session import checked
-from pipeline.task import PositionTask
-
-ROOT = Path(__file__).resolve().parents[1]
-RUN_FILES = {  # what every run leaves that has a confirmed motion
-    *("summary.csv", "summary.md", "trajectories.parquet", "recording.rrd", "run.json", "figures", ".hydra"),
-    *("motion.csv", "motion.json", "motion.yaml"),
-}
-sys.path.insert(0, str(ROOT / "tests" / "benchmarks"))
-from peer import PlanarArm  # noqa: E402
+from pipeline.common.arrays import Array
+from pipeline.config import documents
+from pipeline.model.arm import Arm
+from pipeline.model.kinematics import project
+from pipeline.model.task import PositionTask
+from pipeline.path.curves import Line, circle, direction_vector
+from pipeline.path.reference import Reference
+from pipeline.path.timing import RaisedCosine
+from pipeline.problem.problem import Problem
+from pipeline.reproduce import __main__ as reproduce
+from pipeline.robot import urdf
+from pipeline.run import session
+from tests.benchmarks.peer import PlanarArm
+from tests.support import ROOT
 
 settings.register_profile("project", derandomize=True, deadline=None, max_examples=50)
 settings.load_profile("project")
@@ -134,54 +127,13 @@ def peer(planar_file: Path) -> SimpleNamespace:
     )
 
 
-def differences(function: Callable[[Array], Array], x: Array, step: float = 1e-6) -> Array:
-    """Central differences of function((k,)) -> (...): (..., k)."""
-    columns = [(function(x + step * e) - function(x - step * e)) / (2 * step) for e in np.eye(len(x))]
-    return np.stack(columns, axis=-1)
-
-
-def free_line(intervals: int) -> Problem:
-    """Simulation 1 of the Global paper: 0.40 m in 1 s, free start at rest, on so many intervals."""
-    timing = {"duration": 1.0, "steps": intervals}
-    return prepare(config.check({"boundary": {"kind": "free"}, "path": {"kind": "line"}, "timing": timing}))
-
-
-def backward_differences(problem: Problem, times: Array, motions: Array) -> Array:
-    """sum_i 1/2 qd_i' M(q_i) qd_i dt_i of each motion (P, N + 1, n)."""
-    dt = np.diff(times)
-    velocity = np.diff(motions, axis=1) / dt[:, None]
-    energy = problem.task.arm.kinetic_energy(motions[:, 1:].reshape(-1, 3), velocity.reshape(-1, 3))
-    return energy.reshape(len(motions), -1) @ dt
-
-
-def composed(*overrides: str) -> config.RunConfig:
-    """The checked configuration of a command line."""
-    with initialize_config_dir(str(ROOT / "conf"), version_base="1.3"):
-        return checked(compose("config", overrides=list(overrides)))
-
-
-ROBOTS = ("planar3r", "planar4r", "panda", "xarm7")
-
-
-@cache
-def robot(name: str, **mounting: Any) -> Arm:
-    """The arm of `robot=<name>`, with gravity and rotor inertia where it is asked for."""
-    arm = load(composed(f"robot={name}").robot)
-    for key, value in mounting.items():
-        setattr(arm, key, np.asarray(value, dtype=float))
-    return arm
-
-
-def within_limits(arm: Arm, count: int, rng: np.random.Generator) -> Array:
-    """Random configurations (count, n) inside the joint limits."""
-    low = np.maximum(arm.description.lower, -np.pi)
-    return rng.uniform(low, np.minimum(arm.description.upper, np.pi), size=(count, arm.n))
-
-
 @pytest.fixture(scope="session")
 def reproduced(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Every run that a printed number is found in, with fewer starts and without pictures: the folder above `runs`."""
-    from pipeline.artifacts import figures, identification_figure, recording, study_figure
+    from pipeline.artifacts.figures import candidates as study_figure
+    from pipeline.artifacts.figures import identification as identification_figure
+    from pipeline.artifacts.figures import motions as figures
+    from pipeline.artifacts.recording import recording
 
     folder = tmp_path_factory.mktemp("reproduced")
     few = ("method.global.candidates=300", "method.global.optimised=16", "candidate_study.repeats=4")

@@ -9,8 +9,10 @@ from pathlib import Path
 import pytest
 from hydra import compose, initialize_config_dir
 
-from pipeline import inspect, run, session
-from pipeline.__main__ import CONF
+from pipeline.config.compose import checked
+from pipeline.describe.facts import inspect
+from pipeline.run import run
+from pipeline.run.main import CONF
 
 ROOT = Path(__file__).resolve().parent.parent
 TEXTS = {name: (ROOT / name).read_text(encoding="utf-8") for name in ("README.md", "docs/errata.md", "docs/tour.md")}
@@ -21,7 +23,7 @@ COMMANDS = sorted(
         for line in re.findall(r"python -m pipeline(?![.\w])([^`\n]*)", text)
     }
 )
-INSPECTED = sorted(set(re.findall(r"python -m pipeline\.inspect([^`\n]*)", "\n".join(TEXTS.values()))))
+INSPECTED = sorted(set(re.findall(r"python -m pipeline\.describe([^`\n]*)", "\n".join(TEXTS.values()))))
 
 
 def _values(word: str) -> list[str]:
@@ -36,19 +38,19 @@ def test_commands_state_a_problem(command: str) -> None:
     for number in range(max(len(_values(word)) for word in words) if words else 1):
         overrides = [_values(word)[min(number, len(_values(word)) - 1)] for word in words]
         with initialize_config_dir(CONF, version_base="1.3"):
-            run.prepare(session.checked(compose("config", overrides=overrides)))
+            run.prepare(checked(compose("config", overrides=overrides)))
 
 
 @pytest.mark.parametrize("command", INSPECTED)
 def test_arms_are_inspected(command: str) -> None:
     with initialize_config_dir(CONF, version_base="1.3"):
-        asked = session.checked(compose("config", overrides=shlex.split(command)))
-    assert inspect.inspect(asked.robot, asked.gravity).reach > 0
+        asked = checked(compose("config", overrides=shlex.split(command)))
+    assert inspect(asked.robot, asked.gravity).reach > 0
 
 
 def test_every_module_that_is_called_is_checked() -> None:
     called = {name for text in TEXTS.values() for name in re.findall(r"python -m (pipeline[\w.]*)", text)}
-    assert called == {"pipeline", "pipeline.inspect", "pipeline.reproduce"}  # the last: test_reproduction.py
+    assert called == {"pipeline", "pipeline.describe", "pipeline.reproduce"}  # the last: test_reproduction.py
 
 
 def test_python_example_runs(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:

@@ -6,23 +6,32 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import ROBOTS, composed, robot, within_limits
-from peer import PlanarArm, kinetic_energy_program, solve
 from scipy.spatial.transform import Rotation
-from test_clearance import BALL, with_shapes
-from test_transcription import program_jacobian, program_value
 
-from pipeline.arm import Arm
-from pipeline.candidates import diverse, population
-from pipeline.clearance import Obstacles
-from pipeline.costs import objective_values
-from pipeline.evaluation import evaluate
-from pipeline.methods import calculus_of_variations, global_planner, lsv, pmke
-from pipeline.path import Line, Orientation, RaisedCosine, Reference
-from pipeline.prepare import PROJECT, prepare
-from pipeline.problem import Boundary, IntegralBounds, Limits, Objective, Problem, Status
-from pipeline.task import PoseTask, PositionTask
-from pipeline.transcription import Transcription
+from pipeline.build.problem import prepare
+from pipeline.common.files import PROJECT
+from pipeline.evaluation.evaluation import evaluate
+from pipeline.methods import calculus_of_variations, global_planner, lsv
+from pipeline.methods.pmke import predictive as pmke
+from pipeline.model.arm import Arm
+from pipeline.model.clearance import Obstacles
+from pipeline.model.task import PoseTask, PositionTask
+from pipeline.path.curves import Line
+from pipeline.path.orientation import Orientation
+from pipeline.path.reference import Reference
+from pipeline.path.timing import RaisedCosine
+from pipeline.problem.costs import objective_values
+from pipeline.problem.limits import Limits
+from pipeline.problem.objective import IntegralBounds, Objective
+from pipeline.problem.problem import Boundary, Problem
+from pipeline.problem.solution import Status
+from pipeline.program.program import Transcription
+from pipeline.search.population import population
+from pipeline.search.selection import diverse
+from tests.benchmarks.peer import PlanarArm, kinetic_energy_program, solve
+from tests.model.test_clearance import BALL, with_shapes
+from tests.program.test_program import program_jacobian, program_value
+from tests.support import ROBOTS, composed, robot, within_limits
 
 
 def everything(name: str, rng: np.random.Generator) -> Problem:

@@ -15,6 +15,8 @@ METHOD_COLORS = {
     "pontryagin_as_printed": "#B7791F",
     "pareto": "#2F855A",
 }
+
+
 METHOD_NAMES = {
     "lsv": "LSV",
     "inertia_weighted": "Inertia-weighted",
@@ -26,9 +28,15 @@ METHOD_NAMES = {
     "pontryagin_as_printed": "Pontryagin, as printed",
     "pareto": "Pareto point",
 }
+
+
 # Joints 1, 2, 3 are blue, red and yellow in the papers; the others keep apart from them and from one another.
 JOINT_COLORS = ("#1F5FBF", "#C62828", "#D9A400", "#2E8B57", "#7B3FA0", "#00838F", "#8D5524", "#D81B7A", "#5A6472")
+
+
 UNKNOWN = "#44403C"
+
+
 FRONT = 19  # points after the first over which a front's hues run from blue to red
 
 

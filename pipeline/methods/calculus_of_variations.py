@@ -27,21 +27,36 @@ from numpy.typing import NDArray
 from scipy.integrate import DOP853
 from scipy.optimize import elementwise
 
-from pipeline.arrays import Array
-from pipeline.config import CalculusOfVariationsOptions
-from pipeline.errors import InputError
-from pipeline.kinematics import pseudoinverse, wrap
-from pipeline.lagrangian import Lagrangian
-from pipeline.problem import Boundary, Problem, Progress, Solution, Status, Trajectory, no_progress
-from pipeline.self_motion import manifold, on_manifold, tangent
+from pipeline.common.arrays import Array
+from pipeline.common.errors import InputError
+from pipeline.config.methods import CalculusOfVariationsOptions
+from pipeline.model.kinematics import pseudoinverse, wrap
+from pipeline.problem.lagrangian import Lagrangian
+from pipeline.problem.problem import Boundary, Problem
+from pipeline.problem.solution import Progress, Solution, Status, Trajectory, no_progress
+from pipeline.search.self_motion import manifold, on_manifold, tangent
 
 TRACKING = 1e-10  # [m]
+
+
 ROOT = 1e-6  # of the residual's scale: what a root must reach; a jump through zero does not
+
+
 NEAR_MISS = 0.05  # of the residual's scale
+
+
 VARIATION = 1e-5  # [rad or rad/s] of the unknown, for the Jacobi field
+
+
 MOST_STEPS = 300
+
+
 MOST_SCAN_STEPS = 80  # a regular motion takes 15 to 30 at the scan's tolerance
+
+
 PARTS = 4  # into which an interval of the scan is split
+
+
 JUMP = 0.5  # [rad] between the final configurations of neighbours in the scan: split the interval
 
 

@@ -15,16 +15,19 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.arrays import Array
-from pipeline.candidates import distinct
-from pipeline.config import DynamicProgrammingOptions
-from pipeline.errors import InputError
-from pipeline.kinematics import wrap
-from pipeline.lagrangian import Lagrangian
-from pipeline.manifold_grid import Grid, Index, make_grid
-from pipeline.problem import Boundary, Problem, Progress, Solution, Status, Trajectory, no_progress
+from pipeline.common.arrays import Array
+from pipeline.common.errors import InputError
+from pipeline.config.methods import DynamicProgrammingOptions
+from pipeline.model.kinematics import wrap
+from pipeline.problem.lagrangian import Lagrangian
+from pipeline.problem.problem import Boundary, Problem
+from pipeline.problem.solution import Progress, Solution, Status, Trajectory, no_progress
+from pipeline.search.grid import Grid, Index, make_grid
+from pipeline.search.selection import distinct
 
 TRACKING = 1e-10  # [m] what every node keeps
+
+
 STRIDE = 8  # first spacing, in nodes, of the starts that a cyclic problem is solved from
 
 

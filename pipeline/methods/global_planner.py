@@ -13,29 +13,54 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from pipeline.arrays import Array
-from pipeline.candidates import distinct, diverse, population, ranking, starting_points
-from pipeline.clearance import Clearance, Obstacles
-from pipeline.config import GlobalOptions
-from pipeline.costs import SECOND_ORDER, objective_values
-from pipeline.feasibility import Relaxed, least_violation, violations
-from pipeline.kinematics import wrap
-from pipeline.lagrangian import Lagrangian
-from pipeline.parallel import Workers
-from pipeline.problem import LIMIT_KINDS, Objective, Problem, Progress, Solution, Status, Trajectory, no_progress
-from pipeline.transcription import Transcription
+from pipeline.common.arrays import Array
+from pipeline.common.workers import Workers
+from pipeline.config.methods import GlobalOptions
+from pipeline.model.clearance import Clearance, Obstacles
+from pipeline.model.kinematics import wrap
+from pipeline.problem.costs import SECOND_ORDER, objective_values
+from pipeline.problem.lagrangian import Lagrangian
+from pipeline.problem.limits import LIMIT_KINDS
+from pipeline.problem.objective import Objective
+from pipeline.problem.problem import Problem
+from pipeline.problem.solution import Progress, Solution, Status, Trajectory, no_progress
+from pipeline.program.feasibility import Relaxed, least_violation, violations
+from pipeline.program.program import Transcription
+from pipeline.search.configurations import starting_points
+from pipeline.search.population import population, ranking
+from pipeline.search.selection import distinct, diverse
 
 TRACKING = 1e-8  # [m] what an optimum must keep at every knot
+
+
 # What a coarse grid's optimum needs to be told apart and refined; only the last grid's is reported.
 ROUGH_TOLERANCE = 1e-4
+
+
 ROUGH_ITERATIONS = 120  # starts that succeed take 10 to 100
+
+
 ROUGH = {"constr_viol_tol": 1e-5, "acceptable_tol": 1e-4, "acceptable_constr_viol_tol": 1e-5}
+
+
 ELASTIC_STARTS = 3  # from how many motions the least violation is sought when no motion is feasible
+
+
 FEWER = 12  # starts on a finer grid after none succeeded on the coarse one
+
+
 ROOM = 1e-3  # relative, to a torque limit that may be left out
+
+
 BETWEEN = 4  # points per interval where clearances between knots are looked at
+
+
 CLEARANCE_ROUNDS = 5
+
+
 STRAYED = 1.5  # times the guess's cost, from where on a solve has left it
+
+
 HOPELESS = 0.1  # relative violation on a coarse grid from which on finer ones are not tried
 
 

@@ -10,10 +10,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.arrays import Array
-from pipeline.config import LsvOptions
-from pipeline.kinematics import SingularityWatch, least_velocity
-from pipeline.problem import Problem, Solution, Trajectory
+from pipeline.common.arrays import Array
+from pipeline.config.methods import LsvOptions
+from pipeline.methods.singularity import SingularityWatch
+from pipeline.model.kinematics import least_velocity
+from pipeline.problem.problem import Problem
+from pipeline.problem.solution import Solution, Trajectory
 
 
 def solve(problem: Problem, options: LsvOptions = LsvOptions(), method: str = "lsv") -> Solution:

@@ -16,29 +16,28 @@ import numpy as np
 from scipy.cluster.hierarchy import fcluster, linkage
 from scipy.spatial.distance import squareform
 
-from pipeline.arrays import Array
-from pipeline.candidates import path_distance
-from pipeline.config import GlobalOptions, ParetoOptions
-from pipeline.costs import integrals
+from pipeline.common.arrays import Array
+from pipeline.common.workers import Workers
+from pipeline.config.methods import GlobalOptions, ParetoOptions
 from pipeline.methods import global_planner
 from pipeline.methods.global_planner import TRACKING
-from pipeline.parallel import Workers
-from pipeline.problem import (
-    LIMIT_KINDS,
-    IntegralBounds,
-    Objective,
-    Problem,
-    Progress,
-    Solution,
-    Status,
-    Trajectory,
-    no_progress,
-)
-from pipeline.transcription import Transcription
+from pipeline.problem.costs import integrals
+from pipeline.problem.limits import LIMIT_KINDS
+from pipeline.problem.objective import IntegralBounds, Objective
+from pipeline.problem.problem import Problem
+from pipeline.problem.solution import Progress, Solution, Status, Trajectory, no_progress
+from pipeline.program.program import Transcription
+from pipeline.search.selection import path_distance
 
 SAME_CLASS = 0.6  # [rad] neighbouring points of one class of paths differ by less at every knot
+
+
 VANISHING = "base_rotation"  # can be zero along a whole path, where redundancy is left for it
+
+
 LITTLE = 1e-4  # of the other integral in its extreme
+
+
 IMPROVED = 1e-7  # relative: a smaller gain is none
 
 

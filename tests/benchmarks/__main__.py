@@ -8,22 +8,20 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from pipeline.config import GlobalOptions, PmkeOptions, check
-from pipeline.lagrangian import Lagrangian
-from pipeline.methods import global_planner, pmke
-from pipeline.run import prepare
-from pipeline.shooting import Window
-from pipeline.transcription import Transcription
-
-sys.path.insert(0, str(Path(__file__).parent))
-import peer
-import planner
+from pipeline.build.problem import prepare
+from pipeline.config.methods import GlobalOptions, PmkeOptions
+from pipeline.config.run import check
+from pipeline.methods import global_planner
+from pipeline.methods.pmke import predictive as pmke
+from pipeline.methods.pmke.window import Window
+from pipeline.problem.lagrangian import Lagrangian
+from pipeline.program.program import Transcription
+from tests.benchmarks import peer, planner
 
 REPEATS = 7
 

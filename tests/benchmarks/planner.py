@@ -14,18 +14,20 @@ from typing import Any
 from unittest import mock
 
 import numpy as np
-import peer
 from hydra import compose, initialize_config_dir
 
-from pipeline import session
-from pipeline.arrays import Array
-from pipeline.config import GlobalOptions
-from pipeline.costs import objective_values
-from pipeline.methods import dynamic_programming as dynamic_programming  # so that no timed call imports it
-from pipeline.methods import global_planner
+from pipeline.build.problem import prepare
+from pipeline.common.arrays import Array
+from pipeline.config.compose import checked
+from pipeline.config.methods import GlobalOptions
+from pipeline.methods import (
+    global_planner,
+)
 from pipeline.methods.global_planner import Optimum
-from pipeline.problem import Boundary, Problem, Status
-from pipeline.run import prepare
+from pipeline.problem.costs import objective_values
+from pipeline.problem.problem import Boundary, Problem
+from pipeline.problem.solution import Status
+from tests.benchmarks import peer
 
 SIMULATIONS = ("sim1", "sim2", "sim3", "sim4", "sim5")
 CONVERGED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
@@ -99,7 +101,7 @@ class Peer(Side):
 def simulation(name: str) -> None:
     """One line for the multi-start, one for `starts=dynamic_programming` where that applies, and the optima of all."""
     with initialize_config_dir(str(peer.PROJECT / "conf"), version_base="1.3"):
-        config = session.checked(compose("config", overrides=[f"+experiment={name}"]))
+        config = checked(compose("config", overrides=[f"+experiment={name}"]))
     problem, options = prepare(config), config.method.global_
     grids = global_planner.refinement(problem.times, options.coarse_steps)
     motions, _ = global_planner._starts(problem, grids[0], options, np.random.default_rng(config.seed))

@@ -1,8 +1,0 @@
-"""The one array type of the project's signatures; shapes and units stand in the docstrings."""
-
-from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
-
-Array = NDArray[np.floating[Any]]

@@ -1,0 +1,159 @@
+"""The figures of one run as PNG files: the content of the PMKE paper's Figs 2-12, for any arm and any set of motions.
+
+Each public function below draws one figure from the evaluations and returns it; `write` puts them all into a folder.
+What a singular motion does after its singularity is drawn faint and dotted: it is not to be used.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from pipeline.artifacts import style
+from pipeline.artifacts.figures.panels import (
+    DPI,
+    add_legend,
+    annotate,
+    by_joint,
+    draw_lines,
+    limit_line,
+    new_figure,
+    stacked_panels,
+    unit_of,
+    usable,
+)
+from pipeline.artifacts.figures.stroboscopic import stroboscopic
+from pipeline.common.arrays import Array
+from pipeline.common.files import write_beside
+from pipeline.evaluation.evaluation import Evaluation
+from pipeline.problem.problem import Problem
+
+
+def write(folder: Path, problem: Problem, evaluations: Sequence[Evaluation], *, name: str) -> list[Path]:
+    """Draw the seven figures of a run into `folder`; returns the files."""
+    folder.mkdir(parents=True, exist_ok=True)
+    files = []
+    for draw in (reference, energy, stroboscopic, joints, torques, spectral_radius, tracking):
+        file = folder / f"{draw.__name__}.png"
+        figure = draw(problem, evaluations, name)
+        write_beside(file, partial(figure.savefig, format="png", dpi=DPI))
+        files.append(file)
+    return files
+
+
+def reference(problem: Problem, evaluations: Sequence[Evaluation], name: str) -> Figure:
+    """The curvilinear abscissa and its derivatives (Fig. 2)."""
+    t = np.linspace(0.0, problem.reference.duration, 501)
+    curves = problem.reference.timing.sample(t, problem.reference.geometry.length)
+    figure = new_figure(f"{name}: reference along the path", 7.0, 6.0)
+    labels = ("Abscissa $s$ [m]", r"Speed $\dot s$ [m/s]", r"Acceleration $\ddot s$ [m/s$^2$]")
+    for axes, values, label in zip(stacked_panels(figure, problem, 3), curves, labels, strict=True):
+        axes.plot(t, values, color=style.joint_color(0), linewidth=1.8)
+        axes.set_ylabel(label)
+    return figure
+
+
+def energy(problem: Problem, evaluations: Sequence[Evaluation], name: str) -> Figure:
+    """The running integral of the kinetic energy (Fig. 3) and the energy itself."""
+    figure = new_figure(f"{name}: kinetic energy", 10.0, 6.0)
+    integral, rate = stacked_panels(figure, problem, 2)
+    integral.set_ylabel(r"Integral $\int T\,dt$ [J s]")
+    rate.set_ylabel("Kinetic energy $T$ [J]")
+    for i, e in enumerate(evaluations):
+        event = e.solution.event_time
+        legend = f"{style.name(e.label)}\n{e.energy_integral[-1]:.4g} J s"
+        legend += "" if event is None else f"\n(singular at {event:.2f} s)"
+        draw_lines(integral, e, e.energy_integral, style.color(e.label), legend, i)
+        draw_lines(rate, e, e.kinetic_energy, style.color(e.label), order=i)
+    limit_line(rate, evaluations, lambda e: e.kinetic_energy)
+    for e in evaluations:
+        annotate(rate, e, e.kinetic_energy, "J")
+    add_legend(figure, integral)
+    return figure
+
+
+def joints(problem: Problem, evaluations: Sequence[Evaluation], name: str) -> Figure:
+    """Joint positions with their limits, and velocities (PMKE paper Figs 4-7, 9-12, below; Pontryagin report Figs 3-7 a)."""
+    position, velocity = unit_of(problem, "rad", "m"), unit_of(problem, "rad/s", "m/s")
+    return by_joint(
+        f"{name}: joint positions and velocities",
+        evaluations,
+        (f"Position $q$ [{position}]", position, lambda e: e.q),
+        (rf"Velocity $\dot q$ [{velocity}]", velocity, lambda e: e.qd),
+        bounds=_ranges(problem),
+    )
+
+
+def torques(problem: Problem, evaluations: Sequence[Evaluation], name: str) -> Figure:
+    """Joint torques and powers."""
+    unit = unit_of(problem, "N m", "N")
+    return by_joint(
+        f"{name}: joint torques and powers",
+        evaluations,
+        (rf"Torque $\tau$ [{unit}]", unit, lambda e: e.tau),
+        (r"Power $|\tau\,\dot q|$ [W]", "W", lambda e: e.power),
+    )
+
+
+def spectral_radius(problem: Problem, evaluations: Sequence[Evaluation], name: str) -> Figure:
+    """The largest eigenvalue of the inertia matrix (Fig. 8), each motion's least value marked."""
+    figure = new_figure(f"{name}: spectral radius of the inertia matrix", 10.0, 4.8)
+    (axes,) = stacked_panels(figure, problem, 1)
+    unit = "kg m$^2$" if problem.task.arm.description.turning.all() else "SI units"
+    axes.set_ylabel(rf"Spectral radius $\rho(M)$ [{unit}]")
+    lowest = []
+    for i, e in enumerate(evaluations):
+        k = int(np.nanargmin(e.spectral_radius[: usable(e, e.time)]))
+        lowest.append((e.time[k], e.spectral_radius[k], e))
+        draw_lines(axes, e, e.spectral_radius, style.color(e.label), style.name(e.label), i)
+    # The values stand in one row below the curves, near their moments but apart from one another.
+    lowest.sort(key=lambda entry: entry[0])
+    gap = min(0.13, 1 / len(lowest))
+    place = -gap / 2
+    for after, (t, value, e) in zip(reversed(range(len(lowest))), lowest, strict=True):
+        place = min(max(t / problem.reference.duration, place + gap), 1 - gap * (after + 0.5))
+        axes.plot([t], [value], "o", color=style.color(e.label), markersize=7, markeredgecolor="white", clip_on=False)
+        axes.annotate(
+            f"min {value:.4g}\nat {t:.2f} s",
+            xy=(t, value),
+            xytext=(place, 0.03),
+            textcoords="axes fraction",
+            ha="center",
+            va="bottom",
+            fontsize=9,
+            color=style.color(e.method),
+            arrowprops={"arrowstyle": "-", "color": style.color(e.label), "linewidth": 0.8},
+        )
+    bottom, top = axes.get_ylim()
+    axes.set_yticks([tick for tick in axes.get_yticks() if bottom <= tick <= top])
+    axes.set_ylim(bottom - 0.3 * (top - bottom), top)
+    add_legend(figure, axes)
+    return figure
+
+
+def tracking(problem: Problem, evaluations: Sequence[Evaluation], name: str) -> Figure:
+    """How far the end effector is off its path, and how far the arm is from a singular configuration."""
+    figure = new_figure(f"{name}: tracking and distance from singularity", 10.0, 6.0)
+    error, singular = stacked_panels(figure, problem, 2)
+    error.set_yscale("log", nonpositive="mask")
+    error.set_ylabel("Tracking error [m]")
+    singular.set_ylabel(rf"Least singular value of $J$ [{unit_of(problem, 'm/rad', '1')}]")
+    for i, e in enumerate(evaluations):
+        legend = f"{style.name(e.label)}\nlargest error {e.tracking_error.max():.1e} m"
+        draw_lines(error, e, e.tracking_error, style.color(e.label), legend, i)
+        draw_lines(singular, e, e.singular_value, style.color(e.label), order=i)
+    singular.set_ylim(bottom=0.0)
+    add_legend(figure, error)
+    return figure
+
+
+def _ranges(problem: Problem) -> Array:
+    """The joint limits (2, n) that the motion must keep, or is to stay in the middle of; infinite without any."""
+    bounds, secondary = problem.bounds, problem.objective.secondary
+    if secondary is not None and "joint_centering" in secondary.criteria:
+        return np.array([secondary.lower, secondary.upper])
+    return np.array([bounds.lower, bounds.upper])[:, problem.task.arm.base_coordinates :]

@@ -1,0 +1,177 @@
+"""Panels, lines and notes that all figures over time share."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter
+
+from pipeline.artifacts import style
+from pipeline.common.arrays import Array
+from pipeline.evaluation.evaluation import Evaluation
+from pipeline.problem.problem import Problem
+
+DPI = 130
+
+
+POINTS = 1001  # most points per line: more than a screen shows
+
+
+COLUMNS = 5  # most panels side by side
+
+
+INK, PALE, EVENT, PATH = "#1A202C", "#D5D9DF", "#C53030", "#B83280"
+
+
+Values = Callable[[Evaluation], Array]
+
+
+def by_joint(
+    title: str, evaluations: Sequence[Evaluation], *kinds: tuple[str, str, Values], bounds: Array | None = None
+) -> Figure:
+    """A column per motion, a row per kind (label, unit, values); many motions are broken into blocks of such rows.
+
+    bounds (2, n) are drawn, broken lines in the joints' colours, into the row of the first kind.
+    """
+    blocks, columns = shape_of(len(evaluations))
+    rows = blocks * len(kinds)
+    figure = new_figure(title, 1.0 + columns * (4.4 if columns < 4 else 3.4), 1.2 + rows * 2.6)
+    first: dict[str, Axes] = {}
+    for i, e in enumerate(evaluations):
+        block, column = divmod(i, columns)
+        for row, (label, unit, values) in enumerate(kinds):
+            place = (block * len(kinds) + row) * columns + column + 1
+            axes = figure.add_subplot(rows, columns, place, sharey=first.get(label))
+            if label not in first:
+                first[label] = axes
+                limit_line(axes, evaluations, values)
+            for joint, line in enumerate(values(e).T):
+                draw_lines(axes, e, line, style.joint_color(joint), f"Joint {joint + 1}")
+                for bound in () if bounds is None or row else bounds[:, joint]:
+                    if np.isfinite(bound):
+                        axes.axhline(bound, color=style.joint_color(joint), linestyle=(0, (2, 3)), linewidth=1.0)
+                        low, high = axes.get_ylim()
+                        axes.set_ylim(min(low, 1.05 * bound), max(high, 1.05 * bound))
+            axes.set_xlim(e.time[0], e.time[-1])
+            if row == 0:
+                axes.set_title(style.name(e.label), color=style.color(e.method), fontweight="bold", fontsize=11)
+            if row == len(kinds) - 1:
+                axes.set_xlabel("Time [s]")
+            if column == 0:
+                axes.set_ylabel(label)
+            axes.tick_params(labelleft=column == 0, labelbottom=row == len(kinds) - 1)
+            tidy(axes)
+            annotate(axes, e, values(e), unit)
+    figure.align_ylabels()
+    handles, labels = figure.axes[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=min(len(labels), 4 * columns), frameon=False)
+    return figure
+
+
+def draw_lines(axes: Axes, e: Evaluation, values: Array, shade: str, label: str | None = None, order: int = 0) -> None:
+    """One line over time (N + 1,); what comes after a singularity thin and dotted.
+
+    Lines of odd `order` are dashed and on top, so that two motions that coincide both stay visible.
+    """
+    keep = thin(e.time)
+    time, values, until = e.time[keep], values[keep], usable(e, e.time[keep])
+    dashes, above = ((0, (4, 2.5)), 2.1) if order % 2 else ("-", 2.0)
+    axes.plot(time[:until], values[:until], color=shade, linewidth=1.8, linestyle=dashes, zorder=above, label=label)
+    if until < len(time):
+        axes.plot(time[until - 1 :], values[until - 1 :], color=shade, linewidth=1.1, linestyle=":", alpha=0.8)
+
+
+def limit_line(axes: Axes, evaluations: Sequence[Evaluation], values: Values) -> None:
+    """Show every motion but for spikes that would flatten the rest: at a singularity, or at one knot (a jump)."""
+    shown = []
+    for e in evaluations:
+        smooth = median_filter(values(e), size=5, axes=0, mode="nearest")
+        smooth = smooth[np.isfinite(smooth)]
+        shown.append(smooth if e.solution.event_time is None else np.percentile(smooth, [5, 95]))
+    low, high = np.min(np.concatenate(shown)), np.max(np.concatenate(shown))
+    margin = 0.07 * (high - low) or 1.0
+    headroom = 4 if any(e.solution.event_time is not None for e in evaluations) else 1  # for the note
+    axes.set_ylim(low - margin, high + headroom * margin)
+
+
+def annotate(axes: Axes, e: Evaluation, values: Array, unit: str) -> None:
+    """Say where the motion met a singularity and how far its values leave the panel."""
+    event, lines = e.solution.event_time, []
+    if event is not None:
+        axes.axvline(event, color=EVENT, linewidth=1.0, linestyle="--")
+        lines.append(f"singular at {event:.2f} s")
+    low, high = axes.get_ylim()
+    size = np.abs(values).reshape(len(e.time), -1).max(axis=1)
+    if np.nanmax(values) > high or np.nanmin(values) < low:
+        lines.append(f"peak of {np.nanmax(size):.3g} {unit} cut off")
+    moment = event if event is not None else float(e.time[np.nanargmax(size)])
+    late = moment > (e.time[0] + e.time[-1]) / 2
+    axes.annotate(
+        "\n".join(lines),
+        xy=(moment, 0.98),
+        xycoords=("data", "axes fraction"),
+        xytext=(-16 if late else 8, 0),
+        textcoords="offset points",
+        ha="right" if late else "left",
+        va="top",
+        fontsize=8.5,
+        color=EVENT,
+    )
+
+
+def new_figure(title: str, width: float, height: float) -> Figure:
+    figure = Figure(figsize=(width, height), layout=ConstrainedLayoutEngine(w_pad=0.08, h_pad=0.08))
+    FigureCanvasAgg(figure)
+    figure.suptitle(title, fontsize=min(13.0, 115 * width / len(title)), fontweight="bold", color=INK)
+    return figure
+
+
+def stacked_panels(figure: Figure, problem: Problem, rows: int) -> list[Axes]:
+    """Panels one above the other over the same time."""
+    panels = list(figure.subplots(rows, 1, sharex=True, squeeze=False)[:, 0])
+    for axes in panels:
+        tidy(axes)
+    panels[-1].set_xlabel("Time [s]")
+    panels[-1].set_xlim(0.0, problem.reference.duration)
+    return panels
+
+
+def tidy(axes: Axes) -> None:
+    axes.grid(color="#E2E8F0", linewidth=0.7)
+    axes.set_axisbelow(True)
+    axes.spines[["top", "right"]].set_visible(False)
+
+
+def add_legend(figure: Figure, axes: Axes) -> None:
+    """Beside the panels: there it hides no line, however many there are."""
+    figure.align_ylabels()
+    figure.legend(*axes.get_legend_handles_labels(), loc="outside right center", frameon=False, labelspacing=0.9)
+
+
+def shape_of(count: int) -> tuple[int, int]:
+    """Rows and columns of `count` panels, evenly filled."""
+    rows = math.ceil(count / COLUMNS)
+    return rows, math.ceil(count / rows)
+
+
+def thin(time: Array) -> NDArray[np.intp]:
+    """Indices of at most POINTS knots, the first and the last among them."""
+    return np.linspace(0, len(time) - 1, min(len(time), POINTS)).round().astype(np.intp)
+
+
+def usable(e: Evaluation, time: Array) -> int:
+    """How many of the moments `time` lie before the singularity that `e` met, if it met one."""
+    event = e.solution.event_time
+    return len(time) if event is None else max(1, int(np.searchsorted(time, event, side="right")))
+
+
+def unit_of(problem: Problem, turning: str, sliding: str) -> str:
+    revolute = problem.task.arm.description.turning
+    return turning if revolute.all() else f"{turning} or {sliding}" if revolute.any() else sliding

@@ -1,0 +1,45 @@
+"""Obstacles in matplotlib figures: all kinds are convex, so the hull of points on their surface draws them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+from scipy.spatial import ConvexHull
+from scipy.spatial.transform import Rotation
+
+from pipeline.common.arrays import Array
+from pipeline.robot.shapes import Shape
+
+COLOR = "#C8463C"
+
+
+def surface(shape: Shape) -> Array:
+    """Points (P, 3) [m] on the surface of a solid in the world, of which the hull is the solid."""
+    if shape.kind == "box":
+        corners = np.stack(np.meshgrid(*[(-0.5, 0.5)] * 3), axis=-1).reshape(-1, 3)
+        own = corners * np.array(shape.size)
+    else:
+        u, v = np.meshgrid(np.linspace(0.0, 2 * np.pi, 25), np.linspace(0.0, np.pi, 14))
+        ball = np.stack([np.cos(u) * np.sin(v), np.sin(u) * np.sin(v), np.cos(v)], axis=-1).reshape(-1, 3)
+        own = shape.size[0] * ball
+        if shape.kind == "capsule":
+            own[:, 2] += np.sign(ball[:, 2]) * shape.size[1] / 2
+    return Rotation.from_rotvec(shape.rotation).apply(own) + np.array(shape.position)
+
+
+def outline(shape: Shape, dims: Any = (0, 1)) -> Array:
+    """Its outline (K, 2) [m] seen along the third coordinate, without the first point again at the end."""
+    flat = surface(shape)[:, dims]
+    return flat[ConvexHull(flat).vertices]
+
+
+def draw(axes: Any, shape: Shape, dims: Any) -> None:
+    """The solid in 3-D axes, or its outline in the plane of the coordinates `dims`."""
+    if len(dims) == 3:
+        points = surface(shape)
+        faces = points[ConvexHull(points).simplices]
+        axes.add_collection3d(Poly3DCollection(faces, facecolor=COLOR, edgecolor="none", alpha=0.35))
+    else:
+        axes.fill(*outline(shape, dims).T, facecolor=COLOR, edgecolor="none", alpha=0.35, zorder=1)

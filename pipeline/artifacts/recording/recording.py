@@ -1,0 +1,299 @@
+"""One Rerun recording per run: all motions overlaid, moving on one time line, with everything that is known of them.
+
+Entities, for a motion with the slug `lsv`: `/lsv/joint_position`, `joint_velocity`, `joint_torque` (one vector each),
+`/lsv/kinetic_energy`, `energy_integral`, `tracking_error`, `singular_value`, `spectral_radius` (scalars), and the
+pictures `/lsv/stick`, `trace`, `end_effector` and `/lsv/<robot>`. SI units throughout.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import rerun as rr
+from rerun.chunk import RrdReader
+from scipy.spatial.transform import Rotation
+
+from pipeline.artifacts import style
+from pipeline.artifacts.figures.solids import outline
+from pipeline.artifacts.recording import blueprint
+from pipeline.artifacts.recording.arm import columns, draw_arm, strict
+from pipeline.artifacts.recording.blueprint import faded, pixels, rgba, slug
+from pipeline.artifacts.scene import box, corners, outlines
+from pipeline.common.arrays import Array
+from pipeline.evaluation.evaluation import Evaluation
+from pipeline.model.base import FloatingArm
+from pipeline.problem.problem import Problem
+from pipeline.problem.solution import Status
+from pipeline.robot.shapes import Shape
+
+POSES = 12  # of the stroboscopic picture
+
+
+SOLID = 110  # opacity of the arms, of 255: those behind must shine through
+
+
+REFERENCE = (190, 190, 190)
+
+
+OBSTACLE = (200, 70, 60, 255)
+
+
+def write(
+    file: Path,
+    problem: Problem,
+    evaluations: Sequence[Evaluation],
+    *,
+    name: str,
+    summary: str,
+    properties: Mapping[str, Any],
+    front: Path | None = None,
+) -> None:
+    """Write the recording `file` (.rrd) of all `evaluations`, or raise and leave nothing behind.
+
+    summary: Markdown, shown beside the plots. properties: facts of the run, stored as the recording's property `run`.
+    front: a PNG to show first, such as the Pareto front (2-D views have no axes of their own).
+    """
+    temporary = file.with_name(f"{file.name}.tmp")
+    try:
+        with strict(), rr.RecordingStream("selfmotion") as recording:
+            recording.save(temporary, default_blueprint=_layout(problem, evaluations, front is not None))
+            recording.send_recording_name(name)
+            if facts := _facts(properties):
+                recording.send_property("run", facts)
+            document = rr.TextDocument(summary, media_type=rr.MediaType.MARKDOWN)
+            recording.log("summary", document, static=True)
+            if front is not None:
+                recording.log("picture", rr.EncodedImage(path=front), static=True)
+            _send_reference(recording, problem)
+            if problem.obstacles is not None:
+                send_obstacles(recording, problem.obstacles.shapes, _planar(problem))
+            for evaluation in evaluations:
+                _send_series(recording, problem, evaluation)
+                _send_motion(recording, problem, evaluation)
+        RrdReader(temporary).store()  # raises without the footer: a disk that fills up at the very end goes unreported
+        os.replace(temporary, file)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def read_series(file: Path, entity: str) -> tuple[Array, Array]:
+    """The time (N,) [s] and the values (N, k) of the scalars on `entity`, for example `/lsv/joint_position`."""
+    times, values = [], []
+    for chunk in RrdReader(file).stream().filter(content=entity, has_timeline="time"):
+        batch = chunk.to_record_batch()
+        times.append(batch["time"].to_numpy(zero_copy_only=False).astype("int64") * 1e-9)
+        values.append(batch["Scalars:scalars"].flatten().to_numpy().reshape(len(batch), -1))
+    if not times:
+        raise KeyError(f"{file}: no series on {entity}")
+    time, value = np.concatenate(times), np.concatenate(values)
+    order = np.argsort(time, kind="stable")
+    return time[order], value[order]
+
+
+def _layout(problem: Problem, evaluations: Sequence[Evaluation], front: bool) -> Any:
+    points = [problem.task.arm.base_position[None], _reference(problem)]
+    if problem.obstacles is not None:
+        points.append(np.array([shape.position for shape in problem.obstacles.shapes]))
+    points += [evaluation.skeleton[_finite(evaluation)].reshape(-1, 3) for evaluation in evaluations]
+    arm = problem.task.arm
+    floats = isinstance(arm, FloatingArm) and arm.floats
+    if isinstance(arm, FloatingArm) and floats:
+        points += [corners(arm, e.base)[_finite(e)].reshape(-1, 3) for e in evaluations]
+    labels = [evaluation.label for evaluation in evaluations]
+    revolute = problem.task.arm.description.turning.tolist()
+    return blueprint.build(
+        labels, np.concatenate(points), revolute, _planar(problem), _ranges(evaluations), front, floats
+    )
+
+
+def _ranges(evaluations: Sequence[Evaluation]) -> dict[str, tuple[float, float]]:
+    """What to show of the energies: a motion that met a singularity shoots up there and would flatten all the others."""
+    usable = [evaluation for evaluation in evaluations if evaluation.status is Status.SOLVED]
+    ranges = {}
+    for entity in blueprint.ENERGIES if 0 < len(usable) < len(evaluations) else ():
+        values = np.concatenate([getattr(evaluation, entity)[_finite(evaluation)] for evaluation in usable])
+        high = float(values.max(initial=0.0))
+        if high > 0.0:
+            ranges[entity] = (-0.04 * high, 1.25 * high)
+    return ranges
+
+
+def _planar(problem: Problem) -> bool:
+    return tuple(problem.task.axes) == ("x", "y")
+
+
+def _finite(evaluation: Evaluation) -> Any:
+    """The knots (N + 1,) at which there is a pose to draw: a broken motion may end in values that are not finite."""
+    return np.isfinite(evaluation.skeleton).all(axis=(1, 2)) & np.isfinite(evaluation.q).all(axis=1)
+
+
+def _reference(problem: Problem) -> Array:
+    """The prescribed path (201, 3) [m] in the world; what is not prescribed stays as at `q_init`."""
+    geometry = problem.reference.geometry
+    path = geometry.sample(np.linspace(0.0, geometry.length, 201))[0]
+    return problem.task.in_world(path, problem.task.arm.position(problem.q_init[None])[0])
+
+
+class _Fact:
+    """One value of a property, typed on its own: `rr.AnyValues` holds a key to its first type for the whole process."""
+
+    def __init__(self, value: Any) -> None:
+        self.value = value
+
+    def as_arrow_array(self) -> Any:
+        if not isinstance(self.value, str | Mapping):
+            try:
+                return pa.array(self.value if isinstance(self.value, list | tuple | np.ndarray) else [self.value])
+            except (pa.ArrowException, TypeError, OverflowError):
+                pass
+        return pa.array([str(self.value)])
+
+
+def _facts(properties: Mapping[str, Any]) -> list[Any]:
+    return [
+        rr.DescribedComponentBatch(_Fact(value), rr.ComponentDescriptor(key))
+        for key, value in properties.items()
+        if value is not None
+    ]
+
+
+def _send_reference(recording: Any, problem: Problem) -> None:
+    path = _reference(problem)
+    look = {"colors": REFERENCE, "radii": pixels(3.0)}  # wide and pale: it stays visible under the traces
+    recording.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+    recording.log("reference", rr.LineStrips3D([path], **look), static=True)
+    if _planar(problem):
+        recording.log("planar/reference", rr.LineStrips2D([_flat(path)], draw_order=20.0, **look), static=True)
+
+
+def _send_series(recording: Any, problem: Problem, evaluation: Evaluation) -> None:
+    time, label, root = columns(evaluation.time), evaluation.label, slug(evaluation.label)
+    joints = list(problem.task.arm.description.actuated)
+    colors = [style.joint_color(j) for j in range(len(joints))]
+    vectors = {"joint_position": evaluation.q, "joint_velocity": evaluation.qd, "joint_torque": evaluation.tau}
+    scalars = {
+        "kinetic_energy": evaluation.kinetic_energy,
+        "energy_integral": evaluation.energy_integral,
+        "tracking_error": evaluation.tracking_error,
+        "singular_value": evaluation.singular_value,
+        "spectral_radius": evaluation.spectral_radius,
+    }
+    if evaluation.base.reaction is None:
+        scalars["base_turn"] = evaluation.base.turn
+    for entity, values in vectors.items():
+        lines = rr.SeriesLines(names=joints, colors=[_channels(color) for color in colors], widths=2.0)
+        recording.log(f"{root}/{entity}", lines, static=True)
+        recording.send_columns(f"{root}/{entity}", time, rr.Scalars.columns(scalars=values))
+    event = evaluation.solution.event_time
+    legend = style.name(label) + ("" if event is None else f" (singular at {event:.2f} s)")
+    for entity, values in scalars.items():
+        lines = rr.SeriesLines(names=legend, colors=rgba(label), widths=2.0)
+        recording.log(f"{root}/{entity}", lines, static=True)
+        recording.send_columns(f"{root}/{entity}", time, rr.Scalars.columns(scalars=values))
+
+
+def _channels(color: str) -> tuple[int, ...]:
+    return tuple(int(color[i : i + 2], 16) for i in (1, 3, 5))
+
+
+def _send_motion(recording: Any, problem: Problem, evaluation: Evaluation) -> None:
+    rows = _finite(evaluation)
+    if not rows.any():
+        return
+    root, label, time = slug(evaluation.label), evaluation.label, columns(evaluation.time[rows])
+    skeleton = evaluation.skeleton[rows]
+    _send_arm(recording, problem, evaluation, time, evaluation.q[rows])
+    _send_stick(recording, root, label, time, skeleton, (rr.LineStrips3D, rr.Points3D), {})
+    if _planar(problem):
+        flat, root = _flat(skeleton), f"planar/{root}"
+        _send_stick(recording, root, label, time, flat, (rr.LineStrips2D, rr.Points2D), {"draw_order": 50.0})
+        chosen = np.unique(np.rint(np.linspace(0, len(flat) - 1, POSES)).astype(int))
+        poses = rr.LineStrips2D(list(flat[chosen]), colors=faded(label, 0.3), radii=pixels(0.8), draw_order=10.0)
+        recording.log(f"{root}/poses", poses, static=True)
+        arm = problem.task.arm
+        if isinstance(arm, FloatingArm) and arm.floats:
+            edges = rr.LineStrips2D.columns(strips=list(_flat(outlines(arm, evaluation.base)[rows])))
+            look = {"colors": rgba(label), "radii": pixels(1.5), "draw_order": 45.0}
+            recording.log(f"{root}/spacecraft", rr.LineStrips2D.from_fields(**look), static=True)
+            recording.send_columns(f"{root}/spacecraft", time, edges)
+
+
+def _send_stick(
+    recording: Any,
+    root: str,
+    label: str,
+    time: list[Any],
+    skeleton: Array,
+    kinds: tuple[Any, Any],
+    extra: dict[str, Any],
+) -> None:
+    """The stick figure (K, n + 1, 2 or 3), its joints, and the end effector with its trace; `kinds`: lines and points."""
+    lines, dots = kinds
+    tip, count = skeleton[:, -1], skeleton.shape[1]
+    shown = {"colors": rgba(label), **extra}
+    recording.log(f"{root}/stick", lines.from_fields(radii=pixels(2.0), **shown), static=True)
+    recording.send_columns(f"{root}/stick", time, lines.columns(strips=list(skeleton)))
+    recording.log(f"{root}/joints", dots.from_fields(radii=pixels(3.5), **shown), static=True)
+    joints = dots.columns(positions=skeleton.reshape(-1, skeleton.shape[2])).partition([count] * len(skeleton))
+    recording.send_columns(f"{root}/joints", time, joints)
+    recording.log(f"{root}/trace", lines([tip], radii=pixels(1.2), **shown), static=True)
+    recording.log(f"{root}/end_effector", dots.from_fields(radii=pixels(5.0), **shown), static=True)
+    recording.send_columns(f"{root}/end_effector", time, dots.columns(positions=tip))
+
+
+def _flat(points: Array) -> Array:
+    """World points (..., 3) in a 2-D view (..., 2), which has y pointing down."""
+    return points[..., :2] * np.array([1.0, -1.0])
+
+
+def _send_arm(recording: Any, problem: Problem, evaluation: Evaluation, time: list[Any], q: Array) -> None:
+    """The user's own picture of the arm in the colour of the method; without one the stick figure must do."""
+    moving = evaluation.base.reaction is None
+    rows = _finite(evaluation)
+    poses = (evaluation.base.position[rows], evaluation.base.rotation[rows]) if moving else None
+    arm, root = problem.task.arm, slug(evaluation.label)
+    draw_arm(recording, arm, root, rgba(evaluation.label, SOLID), time, q, poses)
+    if isinstance(arm, FloatingArm) and moving and arm.spacecraft.mass > 0:
+        _send_spacecraft(recording, arm, root, evaluation.label)
+
+
+def send_obstacles(recording: Any, shapes: Sequence[Shape], planar: bool) -> None:
+    """Solids that stand in the world, and for the view from above their outlines."""
+    for shape in shapes:
+        if planar:
+            edge = _flat(outline(shape))
+            line = rr.LineStrips2D([[*edge, edge[0]]], colors=OBSTACLE, radii=pixels(2.0), draw_order=15.0)
+            recording.log(f"planar/obstacles/{slug(shape.name)}", line, static=True)
+        common: dict[str, Any] = {"colors": [OBSTACLE], "fill_mode": "solid"}
+        place = {"quaternions": [Rotation.from_rotvec(shape.rotation).as_quat()]}
+        if shape.kind == "capsule":
+            radius, length = shape.size
+            # Rerun's capsules start at their origin: moved back by half their length.
+            axis = Rotation.from_rotvec(shape.rotation).apply([0.0, 0.0, length / 2])
+            solid: Any = rr.Capsules3D(
+                lengths=[length], radii=[radius], translations=[shape.position - axis], **place, **common
+            )
+        elif shape.kind == "sphere":
+            solid = rr.Ellipsoids3D(radii=[shape.size[0]], centers=[shape.position], **common)
+        else:
+            solid = rr.Boxes3D(sizes=[shape.size], centers=[shape.position], **place, **common)
+        recording.log(f"obstacles/{slug(shape.name)}", solid, static=True)
+
+
+def _send_spacecraft(recording: Any, arm: FloatingArm, root: str, label: str) -> None:
+    """The box that stands for the spacecraft, in the frame of the root link."""
+    shape = box(arm)
+    solid = rr.Boxes3D(
+        sizes=[shape.size],
+        centers=[shape.position],
+        quaternions=[Rotation.from_rotvec(shape.rotation).as_quat()],
+        colors=[rgba(label, SOLID)],
+        fill_mode="solid",
+    )
+    recording.log(f"{root}/spacecraft", rr.CoordinateFrame(f"{root}/{arm.description.base}"), static=True)
+    recording.log(f"{root}/spacecraft", solid, static=True)

@@ -1,0 +1,43 @@
+"""From a configuration to the problem that it states; bad input ends here, in one line."""
+
+from __future__ import annotations
+
+from pipeline.build import base
+from pipeline.build.checks import check_problem
+from pipeline.build.checks import require_reach
+from pipeline.build.goal import make_limits
+from pipeline.build.goal import make_objective
+from pipeline.build.goal import make_obstacles
+from pipeline.build.path import TIMINGS
+from pipeline.build.path import make_knots
+from pipeline.build.path import make_path
+from pipeline.build.path import make_task
+from pipeline.build.robot import initial
+from pipeline.build.robot import load
+from pipeline.config.run import RunConfig
+from pipeline.path.reference import Reference
+from pipeline.problem.problem import Boundary
+from pipeline.problem.problem import Problem
+
+def prepare(config: RunConfig) -> Problem:
+    """The problem that a configuration states; raises InputError, one line, if it cannot be posed."""
+    robot = config.robot
+    arm = load(robot, config.gravity)
+    task = make_task(robot, arm)
+    q_init = initial(robot, arm)
+    geometry, orientation, q_init = make_path(config.path, task, q_init)
+    reference = Reference(geometry, TIMINGS[config.timing.law](config.timing.duration), orientation)
+    problem = Problem(
+        task,
+        reference,
+        q_init,
+        make_knots(config.timing),
+        objective=make_objective(config, arm),
+        limits=make_limits(config.limits, arm),
+        boundary=Boundary(config.boundary.kind),
+        obstacles=make_obstacles(config.obstacles, arm),
+    )
+    check_problem(problem)
+    if config.base.kind == "fixed":
+        require_reach(problem)
+    return base.place(problem, config)

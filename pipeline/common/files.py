@@ -1,0 +1,22 @@
+"""Files that are whole or not there."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+
+def write_beside(file: Path, write: Callable[[Path], Any]) -> None:
+    """Let `write` make a file beside `file`, then rename: a killed run leaves no half file under a final name."""
+    file.parent.mkdir(parents=True, exist_ok=True)
+    unfinished = file.with_name(f".{os.getpid()}.{file.name}")
+    try:
+        write(unfinished)
+        os.replace(unfinished, file)
+    finally:
+        unfinished.unlink(missing_ok=True)
+
+
+PROJECT = Path(__file__).resolve().parents[2]

@@ -1,0 +1,34 @@
+"""The configuration of an experiment, composed from Python: within a run of Hydra as well as without one."""
+
+from __future__ import annotations
+
+from hydra import compose, initialize_config_dir
+from hydra.core.global_hydra import GlobalHydra
+from omegaconf import DictConfig, OmegaConf
+from omegaconf.errors import OmegaConfBaseException
+
+from pipeline.common.errors import ConfigError
+from pipeline.common.files import PROJECT
+from pipeline.config.run import RunConfig, check
+
+
+def experiment(name: str, *overrides: str) -> RunConfig:
+    """The checked configuration of `+experiment=name`; raises ConfigError, one line."""
+    from pipeline.config.compose import checked
+
+    words = [f"+experiment={name}", *overrides]
+    if GlobalHydra.instance().is_initialized():
+        return checked(compose("config", overrides=words))
+    with initialize_config_dir(str(PROJECT / "conf"), version_base="1.3"):
+        return checked(compose("config", overrides=words))
+
+
+def checked(values: DictConfig) -> RunConfig:
+    """The typed configuration of a composed one; raises ConfigError."""
+    own = OmegaConf.masked_copy(values, [str(key) for key in values if key != "hydra"])
+    try:
+        plain = OmegaConf.to_container(own, resolve=True, throw_on_missing=False)
+    except OmegaConfBaseException as error:
+        raise ConfigError(f"{error.full_key}: {str(error.msg).splitlines()[0]}") from None
+    assert isinstance(plain, dict)
+    return check({str(key): value for key, value in plain.items()})

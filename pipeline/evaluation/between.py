@@ -1,0 +1,96 @@
+"""What a motion does between its knots: the cubic spline through them, or samples that come with derivatives."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from pipeline.common.arrays import Array
+from pipeline.evaluation.base import angle_between
+from pipeline.evaluation.limits import clearances, excesses, limit_excess
+from pipeline.evaluation.plant import SinglePlant
+from pipeline.evaluation.sums import weighted_sum
+from pipeline.model.clearance import Clearance
+from pipeline.problem.problem import Boundary, Problem
+from pipeline.problem.solution import Trajectory
+
+CLEARANCES = 5  # of those at which distances from obstacles are taken
+
+
+BETWEEN = 10  # sub-intervals per knot interval on which the motion between knots is judged
+
+
+def between_knots(
+    problem: Problem, plant: SinglePlant, scene: Clearance | None, trajectory: Trajectory, qd_start: Array
+) -> tuple[float, float, float, float, float, dict[str, float]]:
+    """The cubic spline through the knots: kinetic-energy integral (Simpson), objective, largest tracking and orientation
+    errors, smallest clearance, excess of limits.
+    """
+    if not np.all(np.isfinite(trajectory.q)) or len(trajectory.time) < 4:
+        return float("nan"), float("nan"), float("nan"), float("nan"), float("nan"), {}
+    # Only torques tie the first velocity to rest; the energy's sum lets it jump, and nothing prescribes the last one.
+    torque_counts = problem.objective.second_order or bool(np.isfinite(problem.bounds.torque).any())
+    rest = problem.reference.timing.at_rest and problem.boundary is not Boundary.CYCLIC and torque_counts
+    ends = ((1, qd_start), "not-a-knot") if rest else "not-a-knot"
+    spline = CubicSpline(trajectory.time, trajectory.q, bc_type=ends)
+    fraction = np.linspace(0.0, 1.0, BETWEEN + 1)
+    weights = np.array([1.0, *([4.0, 2.0] * (BETWEEN // 2))[:-1], 1.0]) / (3 * BETWEEN)
+    dt = np.diff(trajectory.time)
+    moments = (trajectory.time[:-1, None] + dt[:, None] * fraction).ravel()
+    q, qd, qdd, x_ref = spline(moments), spline(moments, 1), spline(moments, 2), problem.reference.position(moments)
+    energy, error, turned, secondary, turn = np.zeros((5, len(moments)))
+    tau, nb = np.zeros_like(q), plant.nb
+    spinning = np.zeros(len(moments))
+    for i in range(len(moments)):
+        plant.at(q[i], qd[i])
+        energy[i] = plant.kinetic_energy()
+        error[i], turned[i] = plant.task_error(problem.task, x_ref[i])
+        turn[i] = angle_between(plant.start, plant.base()[1][None])[0]
+        spinning[i] = plant.spin_squared()
+        if problem.bounds.any:
+            tau[i] = plant.torque(qdd[i])
+        if problem.objective.secondary:
+            secondary[i] = plant.secondary(problem, q[i])
+    rates = (energy, (qd[:, nb:] ** 2).sum(axis=1), secondary, spinning)
+    integral, norm, gain, spun = (float(rate.reshape(len(dt), -1) @ weights @ dt) for rate in rates)
+    unknown = float("nan")
+    of_base = {"base_rotation": spun, "reaction_force": unknown, "reaction_torque": unknown}
+    objective = weighted_sum(problem, integral, unknown, norm, gain, of_base)
+    clear = float(clearances(scene, q[:: BETWEEN // CLEARANCES]).min())
+    excess = limit_excess(problem, q, qd, tau, clear, float(turn.max()))
+    return integral, objective, float(error.max()), float(turned.max()), clear, excess
+
+
+@dataclass(frozen=True)
+class Audit:
+    """What samples of a motion keep: errors [m, rad], excess of limits and, by kind, the sample and joint of the worst."""
+
+    tracking_error: float
+    orientation_error: float
+    limit_excess: dict[str, float]
+    worst: dict[str, tuple[int, int]]
+
+
+def audit(problem: Problem, time: Array, q: Array, qd: Array, qdd: Array) -> Audit:
+    """Judge samples (K, n) that come with their own velocities and accelerations, at times (K,)."""
+    plant, targets = SinglePlant(problem.task.arm), problem.reference.position(time)
+    error, turned, turn, tau = np.empty(len(time)), np.empty(len(time)), np.empty(len(time)), np.empty_like(q)
+    for i in range(len(time)):
+        plant.at(q[i], qd[i])
+        error[i], turned[i] = plant.task_error(problem.task, targets[i])
+        tau[i] = plant.torque(qdd[i])
+        turn[i] = angle_between(plant.start, plant.base()[1][None])[0]
+    scene = None if problem.obstacles is None else Clearance(problem.task.arm, problem.obstacles)
+    clearance = clearances(scene, q)
+    worst = {
+        kind: tuple(int(place) for place in np.unravel_index(int(np.argmax(excess)), excess.shape))
+        for kind, excess in excesses(problem, q, qd, tau).items()
+    }
+    if scene is not None:
+        worst["clearance"] = (int(np.argmin(clearance)), 0)
+    if np.isfinite(problem.bounds.attitude):
+        worst["attitude"] = (int(np.argmax(turn)), 0)
+    excess = limit_excess(problem, q, qd, tau, float(clearance.min()), float(turn.max()))
+    return Audit(float(error.max()), float(turned.max()), excess, worst)  # type: ignore[arg-type]

@@ -1,0 +1,182 @@
+"""Every reported number, recomputed from q(t) and the arm alone: nothing here comes from a solver.
+
+The plant is a single arm loaded on its own, evaluated knot by knot through Drake's own energy, torque and pose calls,
+so that a mistake in the stacked evaluations or their scaling cannot hide.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.common.arrays import Array
+from pipeline.evaluation.base import Base, angle_between, base_motion, entered_cycle
+from pipeline.evaluation.between import between_knots
+from pipeline.evaluation.limits import LIMITS, clearances, limit_excess
+from pipeline.evaluation.plant import SinglePlant
+from pipeline.evaluation.sums import differences, running_integral, weighted_sum
+from pipeline.model.clearance import Clearance
+from pipeline.problem.problem import Boundary, Problem
+from pipeline.problem.solution import Solution, Status
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """One motion and all that is known of it. Shapes: N + 1 knots, n joints; SI units. What the base does is in `base`.
+
+    Velocities, accelerations and torques are backward differences at the knots (Global paper Section 4): the sum
+    1/2 qd_i' M(q_i) qd_i dt_i is the kinetic-energy integral that the documents print.
+    """
+
+    solution: Solution
+    status: Status
+    message: str
+    time: Array  # (N + 1,)
+    q: Array  # (N + 1, n)
+    qd: Array  # (N + 1, n)
+    qdd: Array  # (N + 1, n)
+    tau: Array  # (N + 1, n)
+    power: Array  # (N + 1, n) |tau qd|
+    position: Array  # (N + 1, 3) end effector in the world
+    skeleton: Array  # (N + 1, n + 1, 3) joint origins and end effector
+    tracking_error: Array  # (N + 1,) [m]
+    orientation_error: Array  # (N + 1,) [rad] angle to the prescribed orientation or direction; zero without one
+    kinetic_energy: Array  # (N + 1,) T
+    energy_integral: Array  # (N + 1,) of T, running
+    torque_integral: Array  # (N + 1,) of tau'tau, running
+    velocity_norm_integral: Array  # (N + 1,) of qd'qd, running
+    secondary: Array  # (N + 1,) w, the sum of the objective's secondary criteria; zero without one
+    objective: float  # the weighted sum of the integrals, less k0 times the trapezoidal integral of w
+    objective_spline: float  # the same of the cubic spline through the knots; nan if torques count
+    singular_value: Array  # (N + 1,) smallest of the task Jacobian
+    spectral_radius: Array  # (N + 1,) of M
+    energy_integral_spline: float  # of the cubic spline through the knots, independent of the grid's quadrature
+    tracking_error_between: float  # largest between knots, along that spline
+    orientation_error_between: float
+    clearance: Array  # (N + 1,) [m] smallest distance of a moving link from an obstacle; infinite without obstacles
+    clearance_between: float  # smallest along that spline
+    limit_excess: dict[str, float]  # by kind, at the knots, relative; see limit_excess()
+    limit_excess_between: dict[str, float]  # the same along that spline
+    base: Base
+
+    @property
+    def method(self) -> str:
+        return self.solution.method
+
+    @property
+    def label(self) -> str:
+        """`global`, `global 2`, ...: the method and, from the second on, its optimum."""
+        return self.method if self.solution.optimum == 1 else f"{self.method} {self.solution.optimum}"
+
+    def integral(self, name: str) -> float:
+        """One of problem.INTEGRALS at the end of the motion."""
+        own = {"kinetic_energy": self.energy_integral, "torque": self.torque_integral}
+        return float((own[name] if name in own else self.base.integrals[name])[-1])
+
+    @property
+    def confirmed(self) -> bool:
+        """Whether the run may call itself successful: a baseline that meets a singularity has done its work."""
+        return self.status in (Status.SOLVED, Status.SINGULAR)
+
+
+def evaluate(problem: Problem, solution: Solution) -> Evaluation:
+    """Recompute everything about `solution`; a motion that breaks its method's promise gets the status UNCONFIRMED."""
+    arm, task, trajectory = problem.task.arm, problem.task, solution.trajectory
+    time, q = trajectory.time, trajectory.q
+    dt = np.diff(time)
+    qd, qdd = differences(trajectory, problem.boundary, problem.reference.timing.at_rest)
+    plant = SinglePlant(arm)
+    if arm.floats and problem.boundary is Boundary.CYCLIC:
+        qd, qdd = entered_cycle(plant, trajectory, qd)
+    count, n = q.shape
+    tau, energy, radius = np.full((count, n), np.nan), np.full(count, np.nan), np.full(count, np.nan)
+    skeleton, singular = np.full((count, n - arm.base_coordinates + 1, 3), np.nan), np.full(count, np.nan)
+    place, way = np.full((count, 3), np.nan), np.full((count, 3, 3), np.nan)
+    tracking, turned, targets = np.full(count, np.nan), np.full(count, np.nan), problem.reference.position(time)
+    for i in np.flatnonzero(np.isfinite(np.hstack([q, qd, qdd])).all(axis=1)):  # Drake refuses other values
+        plant.at(q[i], qd[i])
+        energy[i] = plant.kinetic_energy()
+        tau[i] = plant.torque(qdd[i])
+        spread = plant.motion_map()
+        radius[i] = np.linalg.eigvalsh(spread.T @ plant.mass_matrix() @ spread)[-1]
+        skeleton[i], (place[i], way[i]) = plant.skeleton(), plant.base()
+        singular[i] = np.linalg.svd(plant.task_jacobian(task) @ spread, compute_uv=False)[-1]
+        tracking[i], turned[i] = plant.task_error(task, targets[i])
+    # At the first knot nothing has been spent yet: the interval's values stand at its end.
+    tau[0] = tau[0] if problem.boundary is Boundary.CYCLIC else 0.0
+    position = skeleton[:, -1]
+    scene = None if problem.obstacles is None else Clearance(arm, problem.obstacles)
+    clearance = clearances(scene, q)
+    turn = angle_between(plant.start, way)
+    excess = limit_excess(problem, q, qd, tau, float(clearance.min()), float(turn.max()))
+    spline_integral, spline_objective, between, turned_between, clear_between, excess_between = between_knots(
+        problem, plant, scene, trajectory, qd[0]
+    )
+    secondary = np.array([plant.secondary(problem, qi) for qi in q]) if problem.objective.secondary else np.zeros(count)
+    moving = q
+    q, qd, qdd, tau = (values[:, arm.base_coordinates :] for values in (q, qd, qdd, tau))
+    base = base_motion(problem, solution, place, way, turn, (q, qd, qdd))
+    energy_integral, torque_integral = running_integral(energy, dt), running_integral((tau**2).sum(axis=1), dt)
+    velocity_norm_integral = running_integral((qd**2).sum(axis=1), dt)
+
+    status, message = solution.status, solution.message
+    if status is Status.SOLVED:
+        status, message = _judge(moving, tracking, turned, excess, solution)
+    return Evaluation(
+        solution=solution,
+        status=status,
+        message=message,
+        time=time,
+        q=q,
+        qd=qd,
+        qdd=qdd,
+        tau=tau,
+        power=np.abs(tau * qd),
+        position=position,
+        skeleton=skeleton,
+        tracking_error=tracking,
+        orientation_error=turned,
+        kinetic_energy=energy,
+        energy_integral=energy_integral,
+        torque_integral=torque_integral,
+        velocity_norm_integral=velocity_norm_integral,
+        secondary=secondary,
+        objective=weighted_sum(
+            problem,
+            float(energy_integral[-1]),
+            float(torque_integral[-1]),
+            float(velocity_norm_integral[-1]),
+            float(np.trapezoid(secondary, time)),
+            {name: float(running[-1]) for name, running in base.integrals.items()},
+        ),
+        objective_spline=spline_objective,
+        singular_value=singular,
+        spectral_radius=radius,
+        energy_integral_spline=spline_integral,
+        tracking_error_between=between,
+        orientation_error_between=turned_between,
+        clearance=clearance,
+        clearance_between=clear_between,
+        limit_excess=excess,
+        limit_excess_between=excess_between,
+        base=base,
+    )
+
+
+def _judge(
+    q: Array, tracking: Array, turned: Array, excess: dict[str, float], solution: Solution
+) -> tuple[Status, str]:
+    if not np.all(np.isfinite(q)):
+        return Status.UNCONFIRMED, "the motion holds values that are not finite"
+    for error, unit in ((tracking, "m"), (turned, "rad")):
+        worst = int(np.argmax(error))
+        if error[worst] > solution.tracking_tolerance:
+            return Status.UNCONFIRMED, (
+                f"the end effector is {error[worst]:.2e} {unit} off its path at t = {solution.trajectory.time[worst]:.2f} s; "
+                f"{solution.method} promises {solution.tracking_tolerance:.0e} {unit}"
+            )
+    for kind in solution.limits_kept:
+        if excess.get(kind, 0.0) > LIMITS:
+            return Status.UNCONFIRMED, f"a {kind} limit is exceeded by {100 * excess[kind]:.2g} %"
+    return Status.SOLVED, solution.message

@@ -1,0 +1,49 @@
+"""By how much a motion exceeds each kind of limit, relative to its size."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.common.arrays import Array
+from pipeline.model.clearance import Clearance
+from pipeline.problem.problem import Problem
+
+LIMITS = 1e-6  # relative: how well a method that promises limits must keep them at its knots
+
+
+def clearances(scene: Clearance | None, q: Array) -> Array:
+    if scene is None:
+        return np.full(len(q), np.inf)
+    finite = np.isfinite(q).all(axis=1)
+    clearance = np.full(len(q), np.nan)
+    clearance[finite] = scene.smallest(q[finite])
+    return clearance
+
+
+def limit_excess(
+    problem: Problem, q: Array, qd: Array, tau: Array, clearance: float = np.inf, turn: float = 0.0
+) -> dict[str, float]:
+    """By how much each kind of limit is exceeded, relative to its size (positions: to half the range; clearances: to the
+    margin); <= 0 if kept. turn [rad]: of the base from its start.
+    """
+    if not problem.constrained or not np.all(np.isfinite(q)):
+        return {}
+    found = {kind: float(excess.max()) for kind, excess in excesses(problem, q, qd, tau).items()}
+    if problem.obstacles is not None:
+        found["clearance"] = 1 - clearance / problem.obstacles.margin
+    if np.isfinite(problem.bounds.attitude):
+        found["attitude"] = turn / problem.bounds.attitude - 1
+    return found
+
+
+def excesses(problem: Problem, q: Array, qd: Array, tau: Array) -> dict[str, Array]:
+    """The same (K, n) for every sample and joint, of the kinds that are limited."""
+    limits = problem.bounds
+    half = np.where(np.isfinite(limits.upper - limits.lower), (limits.upper - limits.lower) / 2, 1.0)
+    kinds = {
+        "position": (np.maximum(q - limits.upper, limits.lower - q) / half, limits.upper),
+        "velocity": (np.abs(qd) / limits.velocity - 1, limits.velocity),
+        "torque": (np.abs(tau) / limits.torque - 1, limits.torque),
+        "power": (np.abs(tau * qd) / limits.power - 1, limits.power),
+    }
+    return {kind: excess for kind, (excess, bound) in kinds.items() if np.isfinite(bound).any()}

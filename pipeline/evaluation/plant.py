@@ -1,0 +1,148 @@
+"""One arm in a plant of its own, evaluated knot by knot through Drake's own energy, torque and pose calls.
+
+It shares nothing with the stacked plants and the scaling of the solvers (`arm.py`, `transcription.py`): what the evaluation
+says of a motion comes from here.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import FixedOffsetFrame, JacobianWrtVariable, MultibodyForces, SpatialInertia
+from scipy.spatial.transform import Rotation
+
+from pipeline.common.arrays import Array
+from pipeline.model.arm import Arm
+from pipeline.model.base import FloatingArm
+from pipeline.model.task import PositionTask, Task
+from pipeline.problem.problem import Problem
+
+
+class SinglePlant:
+    """One arm in a plant of its own, its rotor inertias in Drake's actuators."""
+
+    def __init__(self, arm: Arm) -> None:
+        xml, root = arm.description.for_drake
+        plant = self.plant = MultibodyPlant(0.0)
+        (model,) = Parser(plant).AddModelsFromString(xml, "urdf")
+        self.start = Rotation.from_euler("xyz", arm.base_rpy).as_matrix()
+        stand = RigidTransform(RotationMatrix(self.start), arm.base_position)
+        plant.WeldFrames(plant.world_frame(), plant.GetFrameByName(root, model), stand)
+        link = plant.GetFrameByName(arm.description.end_effector, model)
+        tool = RigidTransform(RotationMatrix(Rotation.from_euler("xyz", arm.offset_rpy).as_matrix()), arm.offset)
+        self.end = plant.AddFrame(FixedOffsetFrame("evaluated_point", link, tool, model))
+        plant.mutable_gravity_field().set_gravity_vector(arm.gravity)
+        self.joints = [plant.GetJointByName(name, model) for name in arm.description.joints]
+        for joint, inertia in zip(self.joints, arm.armature, strict=True):
+            plant.AddJointActuator(joint.name(), joint).set_default_rotor_inertia(inertia)
+        if arm.payload > 0:
+            # A ball so small that it is a point, which Drake's check of inertias also lets pass.
+            ball = plant.AddRigidBody("load", model, SpatialInertia.SolidSphereWithMass(arm.payload, 1e-6))
+            plant.WeldFrames(self.end, ball.body_frame())
+        plant.Finalize()
+        self.order = np.array([joint.position_start() for joint in self.joints])
+        self.arm, self.nb = arm, arm.base_coordinates
+        self.root = plant.GetBodyByName(arm.description.drake_name(arm.description.base), model)
+        self.context = plant.CreateDefaultContext()
+        self.forces = MultibodyForces(plant)
+
+    def _scatter(self, values: Array) -> Array:
+        out = np.zeros(len(self.order))
+        out[self.order] = values
+        return out
+
+    def at(self, q: Array, qd: Array) -> None:
+        self.plant.SetPositionsAndVelocities(self.context, np.concatenate([self._scatter(q), self._scatter(qd)]))
+
+    def kinetic_energy(self) -> float:
+        return float(self.plant.CalcKineticEnergy(self.context))
+
+    def torque(self, qdd: Array) -> Array:
+        # Drake's inverse dynamics leaves gravity to the caller.
+        tau = self.plant.CalcInverseDynamics(self.context, self._scatter(qdd), self.forces)
+        return np.asarray(tau - self.plant.CalcGravityGeneralizedForces(self.context))[self.order]
+
+    def mass_matrix(self) -> Array:
+        return np.asarray(self.plant.CalcMassMatrix(self.context))[np.ix_(self.order, self.order)]
+
+    def tip(self) -> Array:
+        return np.asarray(self.end.CalcPoseInWorld(self.context).translation())
+
+    def skeleton(self) -> Array:
+        return np.array(
+            [joint.frame_on_child().CalcPoseInWorld(self.context).translation() for joint in self.joints[self.nb :]]
+            + [self.tip()]
+        )
+
+    def base(self) -> tuple[Array, Array]:
+        """Position (3,) and rotation matrix (3, 3) of the root link."""
+        pose = self.root.EvalPoseInWorld(self.context)
+        return np.asarray(pose.translation()), np.asarray(pose.rotation().matrix())
+
+    def spin_squared(self) -> float:
+        """Of the root link's angular velocity [rad^2/s^2]."""
+        return float((self.root.EvalSpatialVelocityInWorld(self.context).rotational() ** 2).sum())
+
+    def motion_map(self) -> Array:
+        """All velocities by the joints' (N, n): B of `floating.py`."""
+        n, nb = len(self.order), self.nb
+        out = np.vstack([np.zeros((nb, n - nb)), np.eye(n - nb)])
+        if self.arm.floats:
+            inertia = self.mass_matrix()
+            out[:nb] = -np.linalg.solve(inertia[:nb, :nb], inertia[:nb, nb:])
+        return out
+
+    def drift(self) -> Array:
+        """The velocities (N,) of a floating base whose system has momentum, its joints at rest."""
+        q, out = np.asarray(self.plant.GetPositions(self.context))[self.order], np.zeros(len(self.order))
+        if isinstance(self.arm, FloatingArm) and self.arm.floats:
+            inertia = self.mass_matrix()[: self.nb, : self.nb]
+            out[: self.nb] = np.linalg.solve(inertia, self.arm.momentum(q[None])[0])
+        return out
+
+    def secondary(self, problem: Problem, q: Array) -> float:
+        """w at q (n,): Pontryagin report eqs (14), (15), the latter with its square."""
+        criteria, total = problem.objective.secondary, 0.0
+        if criteria is None or not np.all(np.isfinite(q)):
+            return 0.0 if criteria is None else float("nan")
+        if "manipulability" in criteria.criteria:
+            self.at(q, np.zeros_like(q))
+            jacobian = self.task_jacobian(problem.task)
+            total += float(np.sqrt(max(np.linalg.det(jacobian @ jacobian.T), 0.0)))
+        if "joint_centering" in criteria.criteria:
+            for value, low, high in zip(q, criteria.lower, criteria.upper, strict=True):
+                if np.isfinite(high - low):
+                    total -= ((value - (high + low) / 2) / (high - low)) ** 2 / (2 * len(q))
+        return total
+
+    def task_error(self, task: Task, target: Array) -> tuple[float, float]:
+        """Distance [m] and angle [rad] from one target (see task.py)."""
+        distance = float(np.linalg.norm(self.tip()[task.rows] - target[: len(task.rows)]))
+        if isinstance(task, PositionTask):
+            return distance, 0.0
+        rotation = self.end.CalcPoseInWorld(self.context).rotation().matrix()
+        wanted = Rotation.from_rotvec(target[3:]).as_matrix()
+        if task.pointing is None:
+            chord = np.linalg.norm(rotation - wanted) / np.sqrt(8)  # sine of half the angle between them
+        else:
+            axis = np.array(task.pointing) / np.linalg.norm(task.pointing)
+            chord = np.linalg.norm((rotation - wanted) @ axis) / 2
+        return distance, float(2 * np.arcsin(min(chord, 1.0)))
+
+    def task_jacobian(self, task: Task) -> Array:
+        """J (m, n), angular rows in the world: for its singular values."""
+        world = self.plant.world_frame()
+        both = np.asarray(
+            self.plant.CalcJacobianSpatialVelocity(
+                self.context, JacobianWrtVariable.kV, self.end, np.zeros(3), world, world
+            )
+        )[:, self.order]
+        if isinstance(task, PositionTask):
+            return both[3:][task.rows]
+        angular = both[:3]
+        if task.pointing is not None:
+            axis = self.end.CalcPoseInWorld(self.context).rotation().matrix() @ np.array(task.pointing)
+            angular = np.linalg.svd(axis[None])[2][1:] @ angular
+        return np.vstack([both[3:], angular])

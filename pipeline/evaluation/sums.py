@@ -1,0 +1,47 @@
+"""Velocities, accelerations and running integrals by the documents' backward differences (Global paper eqs (3) to (6))."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from pipeline.common.arrays import Array
+from pipeline.problem.problem import Boundary, Problem
+from pipeline.problem.solution import Trajectory
+
+
+def differences(trajectory: Trajectory, boundary: Boundary, at_rest: bool) -> tuple[Array, Array]:
+    """qd, qdd (N + 1, n) by backward differences: qd_i = (q_i - q_(i-1)) / dt_i, qdd_i = (qd_i - qd_(i-1)) / dt_i.
+
+    qd_0 is zero for a motion from rest, qd_N for a cyclic one, and qd_1 for a path that is entered at speed.
+    """
+    dt = np.diff(trajectory.time)[:, None]
+    step = np.diff(trajectory.q, axis=0) / dt
+    if boundary is Boundary.CYCLIC:
+        first = step[-1]
+    else:
+        first = np.zeros_like(step[0]) if at_rest else step[0]
+    qd = np.vstack([first, step])
+    change = np.diff(qd, axis=0) / dt
+    return qd, np.vstack([change[-1] if boundary is Boundary.CYCLIC else np.zeros_like(first), change])
+
+
+def weighted_sum(
+    problem: Problem, energy: float, torque: float, norm: float, secondary: float, base: Mapping[str, float]
+) -> float:
+    """The objective from its integrals; a term without weight does not count, even where it is not known."""
+    weights = problem.objective
+    k0 = weights.secondary.k0 if weights.secondary else 0.0
+    terms = (
+        (weights.kinetic_energy, energy),
+        (weights.torque, torque),
+        (weights.velocity_norm, norm),
+        (-k0, secondary),
+        *((getattr(weights, name), value) for name, value in base.items()),
+    )
+    return sum(weight * term for weight, term in terms if weight)
+
+
+def running_integral(rate: Array, dt: Array) -> Array:
+    return np.concatenate([[0.0], np.cumsum(rate[1:] * dt)])

@@ -1,0 +1,30 @@
+"""When does a motion count as singular? Watched at every step of the integrating methods."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from pipeline.common.arrays import Array
+from pipeline.problem.solution import Solution, Status, Trajectory
+
+
+class SingularityWatch:
+    """Follows the smallest singular value of J, relative to the largest, and reports where it was too small."""
+
+    def __init__(self, threshold: float, max_drift: float) -> None:
+        self.threshold, self.max_drift, self.time, self.smallest = threshold, max_drift, 0.0, np.inf
+
+    def see(self, time: float, jacobian: Array) -> None:
+        values = np.linalg.svd(jacobian, compute_uv=False)
+        ratio = float(values[-1] / values[0])
+        if ratio < self.smallest:
+            self.time, self.smallest = float(time), ratio
+
+    def judge(self, method: str, trajectory: Trajectory, statistics: dict[str, Any]) -> Solution:
+        statistics = {**statistics, "smallest_singular_value_ratio": self.smallest}
+        if self.smallest >= self.threshold:
+            return Solution(method, trajectory, Status.SOLVED, tracking_tolerance=self.max_drift, statistics=statistics)
+        message = f"singular at t = {self.time:.2f} s (smallest singular value {self.smallest:.1e} of the largest)"
+        return Solution(method, trajectory, Status.SINGULAR, message, event_time=self.time, statistics=statistics)

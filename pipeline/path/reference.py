@@ -1,0 +1,37 @@
+"""The motion of the end effector over time: a curve, a timing law and, for poses, an orientation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.common.arrays import Array
+from pipeline.path.curves import Geometry
+from pipeline.path.orientation import Orientation
+from pipeline.path.timing import Timing
+
+
+@dataclass(frozen=True)
+class Reference:
+    """The end-effector motion to follow: a geometry, with or without orientations, run through under a timing law."""
+
+    geometry: Geometry
+    timing: Timing
+    orientation: Orientation | None = None
+
+    @property
+    def duration(self) -> float:
+        return self.timing.duration
+
+    def sample(self, t: Array) -> tuple[Array, Array, Array]:
+        """Targets, their velocities and accelerations at times t (K,), each (K, m), or (K, 6) for poses (see task.py)."""
+        s, sd, sdd = self.timing.sample(np.asarray(t, dtype=float), self.geometry.length)
+        x, tangent, curvature = self.geometry.sample(s)
+        if self.orientation is not None:
+            turned = self.orientation.sample(s)
+            x, tangent, curvature = (np.hstack(pair) for pair in zip((x, tangent, curvature), turned, strict=True))
+        return x, tangent * sd[:, None], curvature * sd[:, None] ** 2 + tangent * sdd[:, None]
+
+    def position(self, t: Array) -> Array:
+        return self.sample(t)[0]

@@ -1,0 +1,39 @@
+"""Bounds on the joint motion and on the base's attitude."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.common.arrays import Array
+
+LIMIT_KINDS = ("position", "velocity", "torque", "power", "clearance", "attitude")
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Bounds (n,) on joint motion; infinite where there are none. Units: rad, rad/s, N m, W.
+
+    attitude [rad]: by how much a floating base may turn from its start, at any time.
+    """
+
+    lower: Array
+    upper: Array
+    velocity: Array
+    torque: Array
+    power: Array
+    attitude: float = np.inf
+
+    @property
+    def any(self) -> bool:
+        """Whether there is a limit at all."""
+        return any(
+            np.isfinite(bound).any()
+            for bound in (self.lower, self.upper, self.velocity, self.torque, self.power, self.attitude)
+        )
+
+    @classmethod
+    def none(cls, n: int) -> Limits:
+        free = np.full(n, np.inf)
+        return cls(-free, free, free, free, free)

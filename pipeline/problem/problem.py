@@ -1,0 +1,51 @@
+"""The data that flows through one run: what is asked (Problem) and what comes back (Solution)."""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass, field
+
+from pipeline.common.arrays import Array
+from pipeline.model.clearance import Obstacles
+from pipeline.model.task import Task
+from pipeline.path.reference import Reference
+from pipeline.problem.limits import Limits
+from pipeline.problem.objective import IntegralBounds, Objective
+
+
+class Boundary(enum.Enum):
+    """What is prescribed of the joint motion at its ends."""
+
+    FIXED = "fixed"  # q(0) given
+    FREE = "free"  # q(0) chosen on the self-motion manifold of the start
+    CYCLIC = "cyclic"  # q(T) = q(0), qd(T) = qd(0)
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Follow `reference` with the arm of `task`, at least cost, within limits.
+
+    q_init: (n,) [rad] the initial configuration (for boundary `free` and `cyclic`: the one that starts are drawn from).
+    times: (N + 1,) [s] the knots of the grid on which a global solution is wanted.
+    qd_init: (n,) [rad/s] the velocity that a motion from q_init comes with; None: at rest, or as the path is entered.
+    """
+
+    task: Task
+    reference: Reference
+    q_init: Array
+    times: Array
+    objective: Objective = field(default_factory=Objective)
+    limits: Limits | None = None
+    boundary: Boundary = Boundary.FIXED
+    integral_bounds: IntegralBounds = field(default_factory=IntegralBounds)
+    obstacles: Obstacles | None = None
+    qd_init: Array | None = None
+
+    @property
+    def bounds(self) -> Limits:
+        return self.limits if self.limits is not None else Limits.none(self.task.arm.n)
+
+    @property
+    def constrained(self) -> bool:
+        """Whether anything limits the motion besides its path."""
+        return self.bounds.any or self.obstacles is not None

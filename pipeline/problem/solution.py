@@ -1,0 +1,62 @@
+"""What a method returns: a motion, how it ended, and statistics of the solver."""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from pipeline.common.arrays import Array
+
+Progress = Callable[[int, int, float], None]  # (done, all, best cost so far)
+
+
+class Status(enum.Enum):
+    """How a method ended; the value is the sentence that a user reads."""
+
+    SOLVED = "solved: the motion follows the path and the method's own conditions hold"
+    SINGULAR = "singular: the method ran into a singular configuration; its motion is not to be used from there on"
+    NOT_CONVERGED = "not converged: the solver stopped before its conditions held; try more iterations or more starts"
+    INFEASIBLE = "infeasible: no motion was found that meets the path and every limit"
+    UNCONFIRMED = "unconfirmed: the motion recomputed from q(t) does not do what the method claims"
+
+    @property
+    def word(self) -> str:
+        return self.value.split(":")[0]
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """A joint motion: time (N + 1,) [s], q (N + 1, n) [rad]. Everything else is computed from these two."""
+
+    time: Array
+    q: Array
+
+
+@dataclass(frozen=True)
+class Solution:
+    """What a method returns: its motion, how it ended, and statistics of the solver (never used for reporting costs).
+
+    `optimum` counts distinct optima of one method from 1 on. `event_time` [s] is when a singularity was met.
+    `tracking_tolerance` [m] is what the method promises to keep of the path at its knots; the evaluation checks it.
+    `limits_kept` are the kinds of limits that it promises to keep at its knots.
+    `found` is False where there is no motion to speak of: the trajectory then only holds the arm at its start.
+    """
+
+    method: str
+    trajectory: Trajectory
+    status: Status
+    message: str = ""
+    optimum: int = 1
+    event_time: float | None = None
+    tracking_tolerance: float = np.inf
+    limits_kept: tuple[str, ...] = ()
+    found: bool = True
+    statistics: dict[str, Any] = field(default_factory=dict)
+
+
+def no_progress(done: int, total: int, best: float) -> None:
+    """Say nothing."""

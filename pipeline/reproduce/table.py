@@ -1,0 +1,96 @@
+"""Printed beside recomputed: one row per printed number, with its verdict and the command that gives it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+
+from pipeline.config.documents import Document, Row, experiments
+from pipeline.reproduce.recompute import Runs, recompute
+from pipeline.reproduce.results import ResultError
+from pipeline.reproduce.verdict import VERDICTS, verdict
+
+COLUMNS = (
+    "document",
+    "place",
+    "quantity",
+    "printed",
+    "unit",
+    "recomputed",
+    "relative_difference",
+    "verdict",
+    "with_printed_masses",
+    "note",
+    "command",
+)
+
+
+def judge(row: Row, value: float) -> str:
+    """The verdict on one row whose recomputed value is known."""
+    between = None if row.between is None else (row.between[0], row.between[1])
+    return verdict(row.printed, value, reading=row.reading, tolerance=row.tolerance, between=between, better=row.better)
+
+
+def command(row: Row) -> str:
+    """The command line whose results hold the number."""
+    names = experiments(row.found)
+    return f"python -m pipeline {'-m ' if len(names) > 1 else ''}+experiment={','.join(names)}"
+
+
+def compare(documents: Sequence[Document], runs: Runs) -> pd.DataFrame:
+    """All rows of the documents, in their order; a number that no run holds is one that differs, with the reason."""
+    masses = _with_printed_masses(runs)
+    rows = []
+    for document in documents:
+        for place, row in document.rows:
+            note = row.note
+            try:
+                value = recompute(row.found, runs)
+            except ResultError as error:
+                value, note = float("nan"), str(error)
+            rows.append(
+                {
+                    "document": document.name,
+                    "place": place.place,
+                    "quantity": row.quantity,
+                    "printed": row.printed,
+                    "unit": row.unit,
+                    "recomputed": value,
+                    "relative_difference": _difference(row, value),
+                    "verdict": judge(row, value),
+                    "with_printed_masses": masses.get((document.name, place.place, row.quantity), np.nan),
+                    "note": "; ".join(part for part in (_read_as(row), note, row.why) if part),
+                    "command": command(row),
+                }
+            )
+    return pd.DataFrame(rows, columns=list(COLUMNS))
+
+
+def counts(table: pd.DataFrame) -> dict[str, int]:
+    """How many rows have each verdict."""
+    return {name: int((table["verdict"] == name).sum()) for name in VERDICTS}
+
+
+def _read_as(row: Row) -> str:
+    return f"read as {row.reading}" if row.reading else ""
+
+
+def _difference(row: Row, value: float) -> float:
+    """recomputed / printed - 1; none where words are printed, or zero."""
+    if row.between is not None or float(row.printed) == 0:
+        return float("nan")
+    return value / float(row.printed) - 1
+
+
+def _with_printed_masses(runs: Runs) -> dict[tuple[str, str, str], float]:
+    """What the masses of the documents' tables give, from the run that identifies them."""
+    if "identify_masses" not in runs:
+        return {}
+    try:
+        found = runs["identify_masses"].table("identification")
+    except ResultError:
+        return {}
+    keys = zip(found["document"], found["place"], found["quantity"], strict=True)
+    return dict(zip(keys, found["with_printed_masses"], strict=True))

@@ -1,0 +1,58 @@
+"""The tables of the reproduction: reproduction.csv for programs, reproduction.md for people."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from pipeline.artifacts.markdown import markdown_table
+from pipeline.common.files import write_beside
+from pipeline.config.documents import Document
+from pipeline.reproduce.table import counts
+
+HEAD = ("place", "quantity", "printed", "recomputed", "difference", "verdict", "with printed masses", "note")
+
+
+def write(folder: Path, documents: Sequence[Document], table: pd.DataFrame) -> None:
+    """reproduction.csv and reproduction.md in `folder`."""
+    write_beside(folder / "reproduction.csv", lambda file: table.to_csv(file, index=False))
+    text = markdown(documents, table)
+    write_beside(folder / "reproduction.md", lambda file: file.write_text(text, encoding="utf-8"))
+
+
+def markdown(documents: Sequence[Document], table: pd.DataFrame) -> str:
+    """A table per document, with the count of verdicts above it."""
+    lines = ["# Printed and recomputed", "", sentence(table) + ".", ""]
+    for document in documents:
+        own = table[table["document"] == document.name]
+        rows = [list(HEAD), *(cells(row) for row in own.to_dict("records"))]
+        lines += [f"## {document.title}", "", f"{document.source}. {sentence(own)}.", "", *markdown_table(rows), ""]
+    return "\n".join(lines)
+
+
+def sentence(table: pd.DataFrame) -> str:
+    """How many of each verdict, in words."""
+    return f"{len(table)} printed numbers: " + ", ".join(f"{count} {name}" for name, count in counts(table).items())
+
+
+def cells(row: dict[Any, Any]) -> list[str]:
+    """One row as text, in the order of HEAD."""
+    unit = "" if row["unit"] in ("", "1") else f" {row['unit']}"
+    difference = row["relative_difference"]
+    return [
+        str(row["place"]),
+        str(row["quantity"]),
+        f"{row['printed']}{unit}",
+        _number(row["recomputed"]),
+        "" if pd.isna(difference) else f"{100 * difference:+.3g} %",
+        str(row["verdict"]),
+        _number(row["with_printed_masses"]),
+        str(row["note"]),
+    ]
+
+
+def _number(value: float) -> str:
+    return "" if pd.isna(value) else f"{value:.4g}"

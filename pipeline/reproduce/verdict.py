@@ -1,0 +1,46 @@
+"""The verdict on one printed number: a pure rule, with no knowledge of where either number comes from."""
+
+from __future__ import annotations
+
+import math
+
+from pipeline.config.documents import half_width
+
+REPRODUCED, BETTER, MISPRINT, DIFFERS = VERDICTS = ("reproduced", "better", "misprint", "differs")
+
+
+_EDGE = 1 + 1e-9  # a value on the edge of the rounding still rounds to what is printed
+
+
+def verdict(
+    printed: str,
+    recomputed: float,
+    *,
+    reading: str = "",
+    tolerance: float | None = None,
+    between: tuple[float, float] | None = None,
+    better: str = "neither",
+) -> str:
+    """`reproduced`, `better`, `misprint` or `differs`, in this order of preference but for `better`.
+
+    reproduced: within the rounding of the printed digits, or within `tolerance` where one is given; where the document
+    says it in words, within the interval `between` that the words stand for.
+    misprint: not so, but within the same of `reading`, another way to read what is printed.
+    better: the value lies on the `better` side (lower, higher) of the printed one, beyond its rounding.
+    differs: all else, a value that is not finite included.
+    """
+    if not math.isfinite(recomputed):
+        return DIFFERS
+    if between is not None:
+        return REPRODUCED if between[0] <= recomputed <= between[1] else DIFFERS
+
+    def fits(text: str) -> bool:
+        allowed = half_width(text) if tolerance is None else tolerance
+        return abs(recomputed - float(text)) <= allowed * _EDGE
+
+    if fits(printed):
+        return REPRODUCED
+    if reading and fits(reading):
+        return MISPRINT
+    gain = {"lower": -1.0, "higher": 1.0}.get(better, 0.0) * (recomputed - float(reading or printed))
+    return BETTER if gain > half_width(reading or printed) else DIFFERS

@@ -1,0 +1,75 @@
+"""What a robot file says of an arm: its chain, limits, links and shapes."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.common.arrays import Array
+from pipeline.robot.shapes import Shape
+
+
+@dataclass(frozen=True)
+class Description:
+    """One serial chain, ready for Drake.
+
+    xml: the reduced URDF. joints: names of the n moving joints, base to tip. revolute: (n,) whether a joint turns.
+    lower, upper: (n,) position limits [rad or m]. velocity: (n,) [rad/s or m/s]. effort: (n,) [N m or N].
+    A limit that the file does not state is infinite. collision: primitive shapes of links. meshes: links that have
+    collision meshes instead, which are not used. pictures: file names of visual meshes.
+    base_coordinates: how many of the joints, the first ones, are not the arm's but move its base (`floating.py`), and
+    root: the link of the xml that they start from.
+    """
+
+    name: str
+    file: Path
+    xml: str
+    base: str
+    end_effector: str
+    joints: tuple[str, ...]
+    revolute: NDArray[np.bool_]
+    lower: Array
+    upper: Array
+    velocity: Array
+    effort: Array
+    links: tuple[str, ...] = ()
+    collision: tuple[Shape, ...] = ()
+    meshes: tuple[str, ...] = ()
+    pictures: tuple[str, ...] = ()
+    base_coordinates: int = 0
+    root: str = ""
+
+    @property
+    def actuated(self) -> tuple[str, ...]:
+        """The names of the arm's own joints."""
+        return self.joints[self.base_coordinates :]
+
+    @property
+    def turning(self) -> NDArray[np.bool_]:
+        """Which of the arm's own joints turn."""
+        return self.revolute[self.base_coordinates :]
+
+    @cached_property
+    def for_drake(self) -> tuple[str, str]:
+        """The reduced URDF and its root link."""
+        root = self.root or self.base
+        if "world" not in self.links:
+            return self.xml, root
+        tree = ET.fromstring(self.xml)
+        for element in tree.iter():
+            for key in ("link", "name"):
+                if element.tag in ("link", "parent", "child") and element.get(key) == "world":
+                    element.set(key, self.drake_name("world"))
+        return ET.tostring(tree, encoding="unicode"), self.drake_name(root)
+
+    def drake_name(self, link: str) -> str:
+        """What a link is called there: Drake takes one called `world` for its own world, so that gets another name."""
+        other = "world_"
+        while other in self.links:
+            other += "_"
+        return other if link == "world" else link

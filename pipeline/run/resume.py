@@ -1,0 +1,51 @@
+"""Whether a folder holds the finished run of a configuration, so that a sweep that is started again can skip it."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from pipeline.common.versions import DECISIVE, versions
+from pipeline.config.documents import FOLDER
+from pipeline.config.path import WaypointsConfig
+from pipeline.config.run import RunConfig
+from pipeline.robot.packages import find
+
+WITHOUT_EFFECT = ("parallel", "sweep")  # groups that change no result
+
+
+def inputs(config: RunConfig) -> dict[str, str]:
+    """Digests of the files that the configuration names: they can change while their names do not."""
+    files = {"robot.urdf": find(config.robot.urdf)}
+    if isinstance(config.path, WaypointsConfig):
+        files["path.file"] = Path(config.path.file)
+    if config.identification.run:
+        files |= {f"conf/reproduction/{name}.yaml": FOLDER / f"{name}.yaml" for name in config.identification.documents}
+    return {key: hashlib.sha256(file.read_bytes()).hexdigest() for key, file in files.items()}
+
+
+def finished(folder: Path, config: RunConfig) -> int | None:
+    """The exit code of the run in `folder` if it is finished and would be the same now, else None."""
+    try:
+        record = json.loads((folder / "run.json").read_text(encoding="utf-8"))
+        now = {**versions(), "config": asdict(config), "inputs": inputs(config)}
+        same = all(_plain(record[key]) == _plain(now[key]) for key in (*DECISIVE, "config", "inputs"))
+        return int(record["exit_code"]) if same else None
+    except (OSError, ValueError, KeyError):
+        return None
+
+
+def forget(folder: Path) -> None:
+    """Take away what says that a run is finished, before it is run again."""
+    for name in ("run.json", "summary.csv", "error.txt"):
+        (folder / name).unlink(missing_ok=True)
+
+
+def _plain(value: Any) -> Any:
+    """As it reads back from JSON, without what has no effect."""
+    if isinstance(value, dict):
+        value = {key: entry for key, entry in value.items() if key not in WITHOUT_EFFECT}
+    return json.loads(json.dumps(value, default=str))

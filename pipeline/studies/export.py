@@ -1,0 +1,111 @@
+"""A motion at the rate of a controller: a smooth curve through its knots, with its exact derivatives, and what it keeps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from pipeline.common.arrays import Array
+from pipeline.evaluation.between import audit
+from pipeline.evaluation.evaluation import Evaluation
+from pipeline.problem.problem import Boundary, Problem
+
+
+@dataclass(frozen=True)
+class Resampled:
+    """Samples at time (K,) [s]: q, qd, qdd (K, n); and what the evaluation's own plant says of their curve.
+
+    limit_excess: by kind, relative (see evaluation.limit_excess); worst: where each is largest, (time [s], joint).
+    """
+
+    method: str
+    optimum: int
+    time: Array
+    q: Array
+    qd: Array
+    qdd: Array
+    tracking_error: float
+    orientation_error: float
+    limit_excess: dict[str, float]
+    worst: dict[str, tuple[float, str]]
+
+    @property
+    def keeps_limits(self) -> bool:
+        return all(excess <= TOLERANCE for excess in self.limit_excess.values())
+
+
+TOLERANCE = 1e-6  # relative: of limits that are met
+
+
+BETWEEN = 4  # sub-intervals per knot interval at which the curve is judged, besides its samples
+
+
+def curve(problem: Problem, time: Array, q: Array) -> CubicSpline:
+    """The C2 spline through the knots: from rest to rest for a path at rest, periodic for a cycle."""
+    if problem.boundary is Boundary.CYCLIC:
+        turns = np.rint((q[-1] - q[0]) / (2 * np.pi)) * 2 * np.pi
+        if not np.any(turns):
+            closed = q.copy()
+            closed[-1] = closed[0]
+            return CubicSpline(time, closed, bc_type="periodic")
+    return CubicSpline(time, q, bc_type="clamped" if problem.reference.timing.at_rest else "not-a-knot")
+
+
+def _whole(problem: Problem, evaluation: Evaluation) -> Callable[..., Array]:
+    """The same curve with a moving base's coordinates before the joints'."""
+    nb, joints = problem.task.arm.base_coordinates, curve(problem, evaluation.time, evaluation.q)
+    if not nb:
+        return joints
+    base = CubicSpline(evaluation.time, evaluation.solution.trajectory.q[:, :nb])
+    return lambda time, order=0: np.hstack([base(time, order), joints(time, order)])
+
+
+def resample(problem: Problem, evaluation: Evaluation, rate: float) -> Resampled:
+    """The motion at `rate` [Hz], its last sample at exactly T."""
+    spline, everything = curve(problem, evaluation.time, evaluation.q), _whole(problem, evaluation)
+    duration = float(evaluation.time[-1])
+    time = np.append(np.arange(0.0, duration - 1e-9, 1.0 / rate), duration)
+    q, qd, qdd = spline(time), spline(time, 1), spline(time, 2)
+    knots = evaluation.time
+    fine = np.interp(np.arange(BETWEEN * (len(knots) - 1) + 1) / BETWEEN, np.arange(len(knots)), knots)
+    judged = np.union1d(time, fine)  # a slow rate must not hide what happens between its samples
+    checked = audit(problem, judged, everything(judged), everything(judged, 1), everything(judged, 2))
+    names = problem.task.arm.description.joints
+    worst = {kind: (float(judged[row]), names[joint]) for kind, (row, joint) in checked.worst.items()}
+    return Resampled(
+        evaluation.method,
+        evaluation.solution.optimum,
+        time,
+        q,
+        qd,
+        qdd,
+        checked.tracking_error,
+        checked.orientation_error,
+        checked.limit_excess,
+        worst,
+    )
+
+
+def sentence(exported: Resampled) -> str:
+    """What a person who sends the motion to a robot must know."""
+    step = exported.time[1] - exported.time[0]
+    head = f"{exported.method} {exported.optimum} at {1 / step:.4g} Hz is at most {exported.tracking_error:.2g} m off its path"
+    if exported.orientation_error > 0:
+        head += f" and {exported.orientation_error:.2g} rad off its orientation"
+    over = [(kind, excess) for kind, excess in exported.limit_excess.items() if excess > TOLERANCE]
+    if not exported.limit_excess:
+        return f"{head}; the run has no limits to check it against"
+    if not over:
+        return f"{head} and meets every limit"
+    parts = []
+    for kind, excess in over:
+        time, joint = exported.worst[kind]
+        whose = f" of {joint}" if kind != "clearance" else ""
+        parts.append(f"exceeds the {kind} limit{whose} by {100 * excess:.3g} % at t = {time:.3g} s")
+    return (
+        f"{head}, but {' and '.join(parts)}; where the knots keep their limits, the curve between them, which starts and ends "
+        "at rest, asks for more: more intervals (timing.steps) or tighter limits give room"
+    )

@@ -1,0 +1,80 @@
+"""The planner's optima beside the stationary motions of the calculus of variations (Global paper Section 4.1, Table 4)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from pipeline.evaluation.evaluation import Evaluation
+from pipeline.model.kinematics import wrap
+from pipeline.problem.problem import Problem
+from pipeline.search.selection import path_distance
+
+SAME = 0.3  # [rad] largest joint difference at which a discrete and a continuous motion are the same optimum
+
+
+def table(problem: Problem, evaluations: Sequence[Evaluation]) -> pd.DataFrame:
+    """One row per motion of either method, paired by joint path; a motion without a partner says why."""
+    revolute = problem.task.arm.description.revolute
+    planner = [e for e in evaluations if e.method == "global" and e.confirmed]
+    stationary = [e for e in evaluations if e.method == "calculus_of_variations" and e.confirmed]
+    pairs = _pairs(planner, stationary, revolute)
+    rows: list[dict[str, Any]] = []
+    for index, e in enumerate(planner):
+        row: dict[str, Any] = {"planner_optimum": e.solution.optimum, "planner_objective": e.objective}
+        if index in pairs:
+            other = stationary[pairs[index]]
+            row |= {
+                "stationary_motion": other.solution.optimum,
+                "stationary_objective": other.solution.statistics["integral"],
+                "mean_absolute_difference": float(np.abs(wrap(e.q - other.q, revolute)).mean()),
+                "kind": other.solution.statistics["kind"],
+            }
+        else:
+            row["remark"] = (
+                "no stationary motion near it: an optimum of the finite-difference sum on these knots that continuous "
+                "time does not have; it moves or disappears on finer grids (timing.steps)"
+            )
+        rows.append(row)
+    for index, other in enumerate(stationary):
+        if index not in pairs.values():
+            kind = other.solution.statistics["kind"]
+            remark = (
+                "the planner did not find it"
+                if kind == "minimum"
+                else "not a minimum: the planner does not look for it"
+            )
+            rows.append(
+                {
+                    "stationary_motion": other.solution.optimum,
+                    "stationary_objective": other.solution.statistics["integral"],
+                    "kind": kind,
+                    "remark": remark,
+                }
+            )
+    columns = [
+        "planner_optimum",
+        "planner_objective",
+        "stationary_motion",
+        "stationary_objective",
+        "mean_absolute_difference",
+    ]
+    return pd.DataFrame(rows, columns=[*columns, "kind", "remark"])
+
+
+def _pairs(planner: list[Evaluation], stationary: list[Evaluation], revolute: NDArray[np.bool_]) -> dict[int, int]:
+    """Which stationary motion belongs to which optimum: one to one, nearest first."""
+    distances = sorted(
+        (path_distance(e.q, other.q, revolute), i, j)
+        for i, e in enumerate(planner)
+        for j, other in enumerate(stationary)
+    )
+    pairs: dict[int, int] = {}
+    for distance, i, j in distances:
+        if distance < SAME and i not in pairs and j not in pairs.values():
+            pairs[i] = j
+    return pairs

@@ -1,0 +1,142 @@
+"""Every file under conf/ composes, is checked by the schema, and says the same as the schema's own defaults."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import pytest
+import yaml
+from hydra import compose, initialize_config_dir
+from omegaconf import DictConfig, OmegaConf
+
+from pipeline.config import compose as composing
+from pipeline.config import run as schema
+from pipeline.config.methods import METHODS as ALL_METHODS
+from pipeline.config.methods import MethodConfig
+from tests.support import ROOT
+
+CONF = ROOT / "conf"
+EXPERIMENTS = sorted(file.stem for file in (CONF / "experiment").glob("*.yaml"))
+OPTIONS = sorted(
+    f"{file.parent.name}={file.stem}"
+    for file in CONF.glob("*/*.yaml")
+    if file.parent.name not in ("experiment", "method", "reproduction")
+)
+METHODS = sorted(file.stem for file in (CONF / "method").glob("*.yaml"))
+
+
+def composed(*overrides: str) -> DictConfig:
+    with initialize_config_dir(str(CONF), version_base="1.3"):
+        return compose("config", overrides=list(overrides), return_hydra_config=True)
+
+
+def checked(*overrides: str) -> schema.RunConfig:
+    with initialize_config_dir(str(CONF), version_base="1.3"):
+        return composing.checked(compose("config", overrides=list(overrides)))
+
+
+def text_of(experiment: str) -> str:
+    return (CONF / "experiment" / f"{experiment}.yaml").read_text(encoding="utf-8")
+
+
+def keys(values: Any, where: str = "") -> set[str]:
+    """All dotted keys of a nested mapping."""
+    if not isinstance(values, dict):
+        return {where}
+    return {where} | {key for name, value in values.items() for key in keys(value, f"{where}.{name}")}
+
+
+def test_there_is_something_to_test() -> None:
+    assert {"traj1", "traj2", "traj3", "traj4", "sim1", "sim2", "sim3", "sim4", "sim5"} <= set(EXPERIMENTS)
+    assert {option.split("=")[0] for option in OPTIONS} >= {
+        "robot",
+        "path",
+        "timing",
+        "objective",
+        "limits",
+        "boundary",
+        "parallel",
+    }
+
+
+def test_the_files_say_what_the_schema_says() -> None:
+    assert checked() == schema.RunConfig()
+
+
+def test_the_files_hold_every_key_of_the_schema() -> None:
+    own = OmegaConf.to_container(
+        OmegaConf.masked_copy(composed(), [f.name for f in dataclasses.fields(schema.RunConfig)])
+    )
+    defaults = dataclasses.asdict(schema.RunConfig())
+    defaults["method"]["global"] = defaults["method"].pop("global_")
+    assert keys(own) == keys(defaults)
+
+
+@pytest.mark.parametrize("option", OPTIONS)
+def test_every_option_of_every_group(option: str) -> None:
+    group, _, name = option.partition("=")
+    made = getattr(checked(option), group)
+    file = yaml.safe_load((CONF / group / f"{name}.yaml").read_text(encoding="utf-8"))
+    expected = {key: None if value == "???" else value for key, value in file.items()}
+    for key, value in expected.items():
+        if value is not None:
+            assert dataclasses.asdict(made)[key] == value, key
+    assert set(expected) == {field.name for field in dataclasses.fields(made)}
+    # What an option leaves alone is the default of its kind: only what the option is for may differ.
+    mounted = {"end_effector", "task", "armature", "collision"}
+    own_words = {
+        "robot": {"name", "urdf", "q_init", *mounted},
+        "timing": {"law"},
+        "boundary": {"kind"},
+        "path": {"file"},
+    }
+    own_words |= {"parallel": {"address"}, "objective": {"kinetic_energy", "torque"}, "limits": {"kind", "power"}}
+    differing = {f.name for f in dataclasses.fields(made) if getattr(made, f.name) != getattr(type(made)(), f.name)}
+    assert differing <= own_words.get(group, set())
+
+
+def test_every_method_has_its_options() -> None:
+    """In the group `method`, or under a key of its own."""
+    grouped = {field.name.rstrip("_") for field in dataclasses.fields(MethodConfig)}
+    assert set(METHODS) == grouped
+    own = {field.name for field in dataclasses.fields(schema.RunConfig)}
+    assert set(ALL_METHODS) - grouped <= own
+    assert grouped <= set(ALL_METHODS)
+
+
+@pytest.mark.parametrize("experiment", EXPERIMENTS)
+def test_every_experiment(experiment: str) -> None:
+    config = checked(f"+experiment={experiment}")
+    assert config.name == experiment
+    assert config != dataclasses.replace(schema.RunConfig(), name=experiment), "an experiment that changes nothing"
+    printed = {method.removesuffix("_as_printed") for method in config.published.values}
+    assert printed <= set(config.methods), "a printed number without a method to compare it with"
+
+
+@pytest.mark.parametrize("experiment", EXPERIMENTS)
+def test_an_experiment_starts_with_the_command_that_runs_it(experiment: str) -> None:
+    lines = [line for line in text_of(experiment).splitlines() if not line.startswith("# @package")]
+    assert lines[0] == f"# python -m pipeline +experiment={experiment}"
+
+
+@pytest.mark.parametrize("experiment", EXPERIMENTS)
+def test_an_experiment_holds_only_differences(experiment: str) -> None:
+    """A value that the composition has anyway does not belong there; methods may be said again."""
+    own = yaml.safe_load(text_of(experiment))
+    picks = [f"{key.removeprefix('override /')}={name}" for row in own.pop("defaults", []) for key, name in row.items()]
+    without = OmegaConf.to_container(composed(*picks), resolve=False)
+    assert isinstance(without, dict)
+    for group in ("robot", "limits", "boundary", "objective", "parallel"):
+        for key, value in (own.get(group) or {}).items():
+            assert without[group][key] != value, f"{group}.{key}"
+
+
+@pytest.mark.parametrize("experiment", EXPERIMENTS)
+def test_no_experiment_picks_a_launcher_or_a_sweeper(experiment: str) -> None:
+    own = yaml.safe_load(text_of(experiment))
+    assert "hydra" not in own
+    assert not [row for row in own.get("defaults", []) if "hydra" in str(row)]
+    base, chosen = composed().hydra, composed(f"+experiment={experiment}").hydra
+    for part in ("launcher", "sweeper", "sweep", "run"):
+        assert OmegaConf.to_container(chosen[part], resolve=False) == OmegaConf.to_container(base[part], resolve=False)

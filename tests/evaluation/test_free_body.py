@@ -1,0 +1,340 @@
+"""Motions on a floating base: momentum and path found again from the joints alone, limits, starts, heavy bases, reactions."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from pipeline.build.problem import prepare
+from pipeline.common.arrays import Array
+from pipeline.evaluation.evaluation import Evaluation, evaluate
+from pipeline.evaluation.free_body import BasePlant, integrate
+from pipeline.methods import global_planner, lsv
+from pipeline.methods.pmke import predictive as pmke
+from pipeline.model.base import FloatingArm
+from pipeline.problem.costs import integrals
+from pipeline.problem.objective import IntegralBounds, Objective
+from pipeline.problem.problem import Boundary, Problem
+from pipeline.problem.solution import Solution, Status, Trajectory
+from pipeline.program.feasibility import least_violation, violations
+from pipeline.program.program import Transcription
+from tests.program.test_program import program_jacobian, program_value
+from tests.support import composed
+
+SHORT = ("timing.duration=4", "timing.steps=40", "method.global.optimised=4")
+ON_BASE = ("robot=planar3r_base", "base=free", *SHORT)
+CIRCLE = ("path=circle", "path.radius=0.05", "boundary=cyclic")
+
+
+@cache
+def stated(*overrides: str) -> tuple[Problem, Solution]:
+    """A problem and the planner's best motion."""
+    config = composed(*overrides)
+    problem = prepare(config)
+    return problem, global_planner.solve(problem, config.method.global_, config.seed)[0]
+
+
+def solved(*overrides: str) -> tuple[Problem, Evaluation]:
+    problem, solution = stated(*overrides)
+    return problem, evaluate(problem, solution)
+
+
+def floating(problem: Problem) -> FloatingArm:
+    assert isinstance(problem.task.arm, FloatingArm)
+    return problem.task.arm
+
+
+STARTS = {"fixed": (), "free": ("boundary=free",), "cyclic": CIRCLE}
+
+
+@pytest.mark.parametrize("start", STARTS)
+def test_momentum_and_path_of_the_planner(start: str) -> None:
+    e = solved(*ON_BASE, *STARTS[start])[1]
+    assert e.status is Status.SOLVED, e.message
+    assert e.base.floating is not None
+    assert e.base.floating.linear < 1e-6
+    assert e.base.floating.angular < 1e-6
+    assert e.base.floating.path_error < 1e-4
+    assert e.base.turn.max() > 1e-3, "the base hardly turns: the test shows nothing"
+    assert e.tracking_error.max() < 1e-8
+    if start == "cyclic":
+        assert np.abs(e.q[-1] - e.q[0]).max() < 1e-9
+        # In the plane closed joints and a closed path leave the base no choice but to come back too.
+        assert e.base.turn[-1] < 1e-7
+    # The base that the solver found at its knots is the one that the joints alone bring about.
+    last = e.base.floating
+    np.testing.assert_allclose(last.position[-1], e.base.position[-1], atol=1e-4)
+    np.testing.assert_allclose(last.rotation[-1].as_matrix(), e.base.rotation[-1], atol=1e-4)
+
+
+@pytest.mark.parametrize("method", ["lsv", "inertia_weighted", "pmke"])
+def test_momentum_and_path_of_the_other_methods(method: str) -> None:
+    config = composed(*ON_BASE, "method.pmke.prediction_step=0.4", "method.pmke.update_interval=0.4")
+    problem = prepare(config)
+    solution = pmke.solve(problem, config.method.pmke) if method == "pmke" else lsv.solve(problem, method=method)
+    e = evaluate(problem, solution)
+    assert e.status is Status.SOLVED, e.message
+    assert e.base.floating is not None
+    assert max(e.base.floating.linear, e.base.floating.angular) < 1e-6
+    assert e.base.floating.path_error < (5e-3 if method == "pmke" else 1e-4)  # PMKE integrates by Euler
+    best = solved(*ON_BASE)[1]
+    assert best.energy_integral[-1] < 0.95 * e.energy_integral[-1]
+
+
+@pytest.mark.slow
+def test_the_path_error_is_of_second_order_in_the_step() -> None:
+    errors = []
+    for steps in (50, 100, 200):
+        problem, solution = stated(*ON_BASE[:-2], f"timing.steps={steps}", "method.global.optimised=1")
+        nb = problem.task.arm.base_coordinates
+        found = integrate(problem, floating(problem), solution.trajectory.time, solution.trajectory.q[:, nb:])
+        errors.append(found.path_error)
+    order = np.log2(np.array(errors[:-1]) / errors[1:])
+    assert errors[-1] < 1e-6
+    assert np.all((order > 1.8) & (order < 2.4)), order
+
+
+def test_a_base_that_was_moved_is_noticed() -> None:
+    """By the tracking of the knots; and the motion that the joints give stays what it was."""
+    problem, solution = stated(*ON_BASE)
+    q = solution.trajectory.q.copy()
+    q[:, 2] += np.linspace(0.0, 0.01, len(q))
+    spoiled = evaluate(problem, replace(solution, trajectory=Trajectory(solution.trajectory.time, q)))
+    assert spoiled.status is Status.UNCONFIRMED
+    assert "off its path" in spoiled.message
+    honest = evaluate(problem, solution)
+    assert spoiled.base.floating is not None
+    assert honest.base.floating is not None
+    assert spoiled.base.floating.path_error == pytest.approx(honest.base.floating.path_error)
+
+
+def test_momentum_that_is_given_is_kept() -> None:
+    problem, e = solved(*ON_BASE, "base.linear_momentum=[0.05,0,0]", "base.angular_momentum=[0,0,0.02]")
+    assert e.status is Status.SOLVED
+    assert e.base.floating is not None
+    assert max(e.base.floating.linear, e.base.floating.angular) < 1e-6
+    plant, last = BasePlant(problem.task.arm), e.base.floating
+    rest = np.zeros(3)
+    moving = plant.follow(
+        last.position[0], last.rotation[0].as_quat(), e.q[0], rest, np.array([0.05, 0, 0, 0, 0, 0.02])
+    )
+    assert np.abs(moving).max() > 1e-3  # before the joints move, the base does
+
+
+def test_limits_are_kept_and_felt() -> None:
+    free = solved(*ON_BASE, "boundary=free")[1]
+    limits = ("limits=joint", "limits.velocity=1.0", "limits.torque=0.03", "limits.power=0.02", "limits.attitude=0.05")
+    e = solved(*ON_BASE, "boundary=free", "method.global.optimised=8", *limits)[1]
+    assert e.status is Status.SOLVED, e.message
+    assert set(e.limit_excess) == {"position", "velocity", "torque", "power", "attitude"}
+    assert max(e.limit_excess.values()) <= 1e-6
+    assert e.limit_excess_between["attitude"] < 1e-3
+    assert e.energy_integral[-1] > free.energy_integral[-1]
+
+
+def test_a_bound_on_the_attitude() -> None:
+    free = solved(*ON_BASE)[1]
+    most = 0.6 * free.base.turn.max()
+    bounded = solved(*ON_BASE, f"limits.attitude={most}")[1]
+    assert bounded.status is Status.SOLVED
+    assert bounded.base.turn.max() == pytest.approx(most, rel=1e-5)
+    assert bounded.energy_integral[-1] > free.energy_integral[-1]
+    assert free.limit_excess == {}
+
+
+def test_an_attitude_that_is_exceeded_is_named() -> None:
+    problem, solution = stated(*ON_BASE)
+    bounded = replace(problem, limits=replace(problem.bounds, attitude=0.01))
+    (found,) = [v for v in violations(bounded, problem.times, solution.trajectory.q) if v.kind == "attitude"]
+    e = evaluate(bounded, solution)
+    assert found.reached == pytest.approx(e.base.turn.max(), rel=1e-6)
+    assert found.relative == pytest.approx(e.limit_excess["attitude"], rel=1e-6)
+    assert "the attitude limit of the base (0.01 rad) cannot be met" in found.sentence
+    assert e.status is Status.UNCONFIRMED
+    assert "attitude limit is exceeded" in e.message
+    relaxed = least_violation(bounded, problem.times, [solution.trajectory.q])
+    assert relaxed is not None
+    assert relaxed.feasible  # there is a way to turn less
+
+
+def test_a_fine_grid_does_not_make_a_cycle_harder() -> None:
+    """Closed joints leave the base turns about the centre of mass alone: rows that these cannot change must not be there."""
+    _, solution = stated(*ON_BASE, *CIRCLE, "timing.steps=100", "method.global.optimised=2")
+    assert solution.status is Status.SOLVED, solution.message
+    assert solution.statistics["solves"][-1]["iterations"] < 30
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("orientation", ["none", "full"])
+def test_cycles_in_space(orientation: str) -> None:
+    """Closed joints and position leave the base one turn, about the line from the centre of mass to the end effector."""
+    words = ("robot=panda", "base=free", "base.mass=60", "base.inertia=4.9", "base.com=[0,0,-0.35]", *CIRCLE)
+    around = ("path.center_direction=[0,1,0]", "path.normal=[1,0,0]", f"robot.orientation={orientation}")
+    e = solved(
+        *words,
+        *around,
+        "timing.duration=4",
+        "timing.steps=24",
+        "method.global.candidates=40",
+        "method.global.optimised=2",
+    )[1]
+    assert e.status is Status.SOLVED, e.message
+    assert np.abs(e.q[-1] - e.q[0]).max() < 1e-9
+    assert e.base.turn.max() > 1e-3
+    if orientation == "full":
+        assert e.base.turn[-1] < 1e-6
+
+
+@pytest.mark.slow
+def test_a_cycle_with_torques() -> None:
+    problem, e = solved(*ON_BASE, *CIRCLE, "objective=torque")
+    assert e.status is Status.SOLVED, e.message
+    assert np.abs(e.q[-1] - e.q[0]).max() < 1e-9
+    costs = integrals(problem, problem.times, e.solution.trajectory.q)
+    assert e.torque_integral[-1] == pytest.approx(costs.torque, rel=1e-6)
+    energy = solved(*ON_BASE, *CIRCLE)[1]
+    assert e.torque_integral[-1] < energy.torque_integral[-1]
+
+
+# --- heavy bases, and a base that is held -----------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+def test_heavy_bases_are_fixed_ones_in_the_limit() -> None:
+    """Energies differ from the fixed base's in proportion to 1 / mass, the base turns in proportion to it."""
+    words = (
+        *SHORT,
+        "method.global.optimised=2",
+        "path.length=0.2",
+        "timing.steps=25",
+        "method.pmke.prediction_step=0.8",
+        "method.pmke.update_interval=0.4",
+    )
+
+    def energies(*base: str) -> tuple[Array, float]:
+        config = composed(*words, *base)
+        problem = prepare(config)
+        found = [
+            lsv.solve(problem),
+            lsv.solve(problem, method="inertia_weighted"),
+            pmke.solve(problem, config.method.pmke),
+            global_planner.solve(problem, config.method.global_, config.seed)[0],
+        ]
+        results = [evaluate(problem, solution) for solution in found]
+        return np.array([e.energy_integral[-1] for e in results]), float(results[-1].base.turn.max())
+
+    fixed, _ = energies()
+    masses, gaps, turns = (10.0, 1e3, 1e6), [], []
+    for mass in masses:
+        own, turn = energies("base=free", f"base.mass={mass}", f"base.inertia={0.02 * mass}")
+        gaps.append(np.abs(own / fixed - 1))
+        turns.append(turn)
+    assert np.all(gaps[0] > 1e-2), gaps
+    assert np.all(gaps[1] < 0.05), gaps
+    assert np.all(gaps[2] < 5e-5), gaps
+    order = np.log10(gaps[1] / gaps[2]) / 3  # 1: in proportion to 1 / mass
+    np.testing.assert_allclose(order, 1.0, atol=0.15)
+    assert turns[1] / turns[2] == pytest.approx(1e3, rel=0.05)
+
+
+def test_reactions_are_the_rate_of_momentum(rng: np.random.Generator) -> None:
+    """Of a motion of the joints on a base that stands still: by central differences of Drake's momentum."""
+    problem, e = solved(*SHORT)
+    assert e.base.reaction is not None
+    plant, h = BasePlant(problem.task.arm), 1e-5
+    rotation, position = plant.start
+    for i in (5, 17, 33):
+        sides = []
+        for sign in (1, -1):
+            qd = e.qd[i] + sign * h * e.qdd[i]
+            q = e.q[i] + sign * h * e.qd[i] + h * h * e.qdd[i] / 2
+            plant.at(position, rotation, q, np.concatenate([np.zeros(6), qd]))
+            sides.append(plant.momentum())
+        np.testing.assert_allclose(e.base.reaction[i], (sides[0] - sides[1]) / (2 * h), atol=1e-7)
+
+
+def test_least_reaction_on_a_held_base() -> None:
+    words = (*SHORT, "boundary=free", "objective=reaction", "objective.force=0.1")
+    problem, e = solved(*words)
+    plain, energy = solved(*SHORT, "boundary=free")
+    assert isinstance(problem.task.arm, FloatingArm)
+    assert not problem.task.arm.floats
+    assert e.status is Status.SOLVED, e.message
+    assert e.objective == pytest.approx(0.1 * e.integral("reaction_force") + e.integral("reaction_torque"))
+    costs = integrals(problem, problem.times, e.solution.trajectory.q)
+    assert e.integral("reaction_force") == pytest.approx(costs.reaction_force, rel=1e-6)
+    assert e.integral("reaction_torque") == pytest.approx(costs.reaction_torque, rel=1e-6)
+    assert e.objective < 0.8 * (0.1 * energy.integral("reaction_force") + energy.integral("reaction_torque"))
+    # The same joints on the plain fixed base: the same energies and torques.
+    again = evaluate(plain, Solution("x", Trajectory(e.time, e.q), Status.SOLVED))
+    np.testing.assert_allclose(again.energy_integral, e.energy_integral, rtol=1e-9)
+    np.testing.assert_allclose(again.tau, e.tau, atol=1e-9)
+
+
+@pytest.mark.slow
+def test_least_turning_brings_the_base_to_rest() -> None:
+    """A planar arm with r = 1 can follow the path and turn its base by nothing."""
+    e = solved(*ON_BASE, "objective=base_rotation", "method.global.optimised=6")[1]
+    energy = solved(*ON_BASE)[1]
+    assert e.status is Status.SOLVED, e.message
+    assert e.integral("base_rotation") < 1e-6 * energy.integral("base_rotation")
+    assert e.energy_integral[-1] > energy.energy_integral[-1]
+
+
+# --- the program ------------------------------------------------------------------------------------------------------
+
+PROGRAMS = {
+    "planar, all limits": (
+        ("robot=planar3r_base", "base=free", "limits=joint_torque_power", "limits.attitude=0.3"),
+        {"objective": Objective(0.5, 0.3, base_rotation=0.2), "integral_bounds": IntegralBounds(1.0, 1.0, 0.5)},
+    ),
+    "planar, cycle, momentum": (
+        ("robot=planar3r_base", "base=free", "base.linear_momentum=[0.1,0.2,0]", *CIRCLE, "limits=joint_torque_power"),
+        {"objective": Objective(0.0, 1.0)},
+    ),
+    "panda, all limits": (
+        (
+            *(
+                "robot=panda",
+                "base=free",
+                "base.mass=20",
+                "base.inertia=2",
+                "path.direction=[0,1,0]",
+                "limits.attitude=0.3",
+            ),
+            *("limits=joint_torque_power", "base.angular_momentum=[0.1,0,0.2]", "robot.orientation=pointing"),
+        ),
+        {"objective": Objective(0.5, 0.3, base_rotation=0.2), "integral_bounds": IntegralBounds(base_rotation=0.5)},
+    ),
+    "panda, held": (
+        ("robot=panda", "objective=reaction", "path.direction=[0,1,0]", "limits=joint_torque_power"),
+        {
+            "objective": Objective(0.0, reaction_force=0.4, reaction_torque=0.6),
+            "integral_bounds": IntegralBounds(reaction_torque=2.0, torque=3.0),
+        },
+    ),
+}
+
+
+@pytest.mark.parametrize("elastic", [(), ("attitude", "velocity", "torque")], ids=["hard", "elastic"])
+@pytest.mark.parametrize("kind", PROGRAMS)
+def test_derivatives_of_the_whole_program(kind: str, elastic: tuple[str, ...], rng: np.random.Generator) -> None:
+    words, changes = PROGRAMS[kind]
+    problem = prepare(composed(*words, "timing.duration=2", "timing.steps=13"))
+    if problem.boundary is not Boundary.CYCLIC:
+        problem = replace(problem, boundary=Boundary.FREE)
+    problem = replace(problem, **changes)
+    guess = problem.q_init + np.cumsum(0.05 * rng.normal(size=(14, problem.task.arm.n)), axis=0)
+    made = Transcription(problem, problem.times, guess, elastic=elastic)
+    x = 0.3 * rng.normal(size=made.program.num_vars())
+    x[: made.y.size] = 0.03 * (guess + 0.1 * rng.normal(size=guess.shape)).ravel()
+    jacobian, h = program_jacobian(made, x), 1e-6
+    for _ in range(6):
+        way = rng.normal(size=len(x))
+        way[: made.y.size] *= 0.03
+        expected = (program_value(made, x + h * way) - program_value(made, x - h * way)) / (2 * h)
+        scale = np.abs(jacobian) @ np.abs(way) + 1e-9 * np.abs(program_value(made, x)) / h + 1e-12
+        assert (np.abs(jacobian @ way - expected) / scale).max() < 1e-5

@@ -1,0 +1,82 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.build.problem import prepare
+from pipeline.config.methods import PmkeOptions
+from pipeline.evaluation.evaluation import evaluate
+from pipeline.methods import global_planner
+from pipeline.methods.pmke import predictive as pmke
+from pipeline.methods.pmke.receding import _knots
+from pipeline.problem.costs import integrals
+from pipeline.problem.objective import Objective
+from pipeline.problem.problem import Problem
+from pipeline.problem.solution import Status
+from tests.support import composed
+
+WINDOW = PmkeOptions(limits=True, prediction_step=0.2, horizon=5, update_interval=0.6)
+
+
+def trajectory3(*overrides: str) -> Problem:
+    return prepare(composed("path=line", "timing.steps=50", *overrides))
+
+
+def test_limits_hold_at_every_executed_knot_and_the_cost_is_near_the_optimum() -> None:
+    asked = trajectory3("limits.velocity=0.32", "limits=joint")
+    done = pmke.solve(asked, WINDOW)
+    judged = evaluate(asked, done)
+    assert judged.status is Status.SOLVED, judged.message
+    assert max(judged.limit_excess.values()) <= 1e-6
+    assert judged.limit_excess["velocity"] > -0.2, "the limit is not felt: the test shows nothing"
+    assert judged.tracking_error.max() < 1e-7
+    best = evaluate(asked, global_planner.solve(asked)[0])
+    assert judged.objective < 1.1 * best.objective
+    log = done.statistics["predictions"]
+    assert [round(entry["time"], 6) for entry in log] == pytest.approx(np.arange(0, 10, 0.6).tolist())
+    assert all(entry["converged"] and entry["wall_time_s"] > 0 for entry in log)
+    assert done.statistics["update_interval"] == pytest.approx(0.6)
+
+
+def test_a_window_knows_the_velocity_it_comes_with() -> None:
+    """Squared torques over a window change when the arm arrives at speed; the first acceleration starts from there."""
+    asked = trajectory3("objective=torque")
+    q = np.tile(asked.q_init, (4, 1)) + np.linspace(0, 0.3, 4)[:, None]
+    times, speed = np.linspace(0.0, 0.6, 4), np.array([0.4, -0.2, 0.1])
+    moving = replace(asked, times=times, qd_init=speed)
+    step = np.diff(q, axis=0) / 0.2
+    qdd = np.diff(np.vstack([speed, step]), axis=0) / 0.2
+    tau = asked.task.arm.inverse_dynamics(q[1:], step, qdd)
+    assert integrals(moving, times, q).torque == pytest.approx(0.2 * (tau**2).sum(), rel=1e-12)
+
+
+def test_torque_as_the_objective_of_the_predictions_costs_less_torque() -> None:
+    asked = trajectory3()
+    options = replace(WINDOW, limits=False, prediction_step=0.5, update_interval=0.5, horizon=4)
+    interpolated = evaluate(asked, pmke.solve(asked, replace(options, objective="torque")))
+    assert interpolated.status is Status.SOLVED
+    by_energy = evaluate(asked, pmke.solve(asked, WINDOW))
+    by_torque = evaluate(asked, pmke.solve(asked, replace(WINDOW, objective="torque")))
+    best = evaluate(asked, global_planner.solve(replace(asked, objective=Objective(0.0, 1.0)))[0])
+    assert by_torque.status is by_energy.status is Status.SOLVED
+    assert best.torque_integral[-1] * 0.9 < by_torque.torque_integral[-1] < 0.8 * by_energy.torque_integral[-1]
+    assert by_torque.energy_integral[-1] > by_energy.energy_integral[-1]
+
+
+def test_what_cannot_be_met_is_said() -> None:
+    asked = trajectory3("limits.velocity=0.12", "timing.steps=25")
+    done = pmke.solve(asked, WINDOW)
+    assert not done.found
+    assert done.status is Status.INFEASIBLE
+    assert "the velocity limit of joint" in done.message
+    assert evaluate(asked, done).status is Status.INFEASIBLE
+
+
+def test_the_knots_reach_to_the_end_of_the_path() -> None:
+    times = np.linspace(0.0, 1.0, 11)
+    np.testing.assert_allclose(_knots(times, 2, 4, 3), [0.2, 0.3, 0.4, 0.6, 0.8, 1.0])
+    np.testing.assert_allclose(_knots(times, 8, 10, 3), [0.8, 0.9, 1.0])
+    np.testing.assert_allclose(_knots(times, 2, 4, 0), [0.2, 0.3, 0.4])
+    np.testing.assert_allclose(_knots(times, 6, 8, 5), [0.6, 0.7, 0.8, 0.9, 1.0])

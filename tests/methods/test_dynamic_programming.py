@@ -1,0 +1,135 @@
+"""Dynamic programming on the self-motion manifold, against known optima and its own guarantees."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.common.errors import InputError
+from pipeline.config.methods import DynamicProgrammingOptions
+from pipeline.methods.dynamic_programming import forward, minima, paths, round_trips, solve, starts
+from pipeline.path.curves import circle
+from pipeline.path.reference import Reference
+from pipeline.path.timing import RaisedCosine
+from pipeline.problem.limits import Limits
+from pipeline.problem.objective import Objective
+from pipeline.problem.problem import Boundary, Problem
+from pipeline.problem.solution import Status
+from pipeline.search.grid import make_grid
+from tests.support import ROOT, backward_differences, free_line
+
+ROBOT = ROOT / "robots" / "planar3r.urdf"
+Q_INIT = np.array([0.0, 0.327, -0.754])
+# The 12-interval optima of the independent exact-Hessian program (tests/benchmarks/peer.py) with a free start.
+OPTIMA_12 = [0.052714, 0.058123, 0.059642, 0.069770]
+BEST_25 = 0.052959
+
+
+@pytest.fixture(scope="module")
+def line() -> Problem:
+    return free_line(100)
+
+
+@pytest.fixture(scope="module")
+def limits() -> Limits:
+    """Global paper, Table 2: displacement and velocity."""
+    reach, free = np.deg2rad([90.0, 120.0, 120.0]), np.full(3, np.inf)
+    return Limits(-reach, reach, np.full(3, 3.8), free, free)
+
+
+def test_all_optima_are_among_the_starts(line: Problem) -> None:
+    times = np.linspace(0, 1, 13)
+    motions = starts(line, times, 180)
+    x_ref = np.tile(line.reference.position(times), (len(motions), 1))
+    assert np.abs(line.task.value(motions.reshape(-1, 3)) - x_ref).max() < 1e-10
+    costs = backward_differences(line, times, motions)
+    assert (np.diff(costs) >= 0).all()
+    for optimum in OPTIMA_12:
+        assert np.any((costs > optimum) & (costs < 1.02 * optimum))
+
+
+def test_second_order_from_above(line: Problem) -> None:
+    """The excess over the 12-interval optimum is positive and falls with the square of the node spacing."""
+    times = np.linspace(0, 1, 13)
+    sizes = [90, 180, 360, 720]
+    excess = []
+    for nodes in sizes:
+        grid = make_grid(line, times, nodes)
+        excess.append(forward(grid, np.zeros(len(grid.layers[0].q)))[0].min() - OPTIMA_12[0])
+    assert min(excess) > 0
+    order = -np.polyfit(np.log(sizes), np.log(excess), 1)[0]
+    assert 1.6 < order < 2.4
+
+
+def test_solution_and_its_grid_error(line: Problem) -> None:
+    solutions = solve(line, DynamicProgrammingOptions())
+    best = solutions[0]
+    assert best.status is Status.SOLVED
+    cost, error = best.statistics["cost"], best.statistics["grid_error"]
+    motion = best.trajectory
+    assert backward_differences(line, motion.time, motion.q[None])[0] == pytest.approx(cost, rel=1e-9)
+    assert BEST_25 < cost < BEST_25 + error
+    assert set(best.statistics["loops"]) == {1, 2}
+
+
+def test_fixed_start(line: Problem) -> None:
+    (best, *_) = solve(replace(line, boundary=Boundary.FIXED), DynamicProgrammingOptions())
+    np.testing.assert_array_equal(best.trajectory.q[0], Q_INIT)
+    # 0.06093 is the optimum on 101 points; 25 intervals and the nodes add a little.
+    assert 0.0609 < best.statistics["cost"] < 0.0635
+
+
+def test_limits_are_kept(line: Problem, limits: Limits) -> None:
+    tight = replace(limits, velocity=np.full(3, 3.2))
+    free, limited = (solve(replace(line, limits=bounds), DynamicProgrammingOptions())[0] for bounds in (limits, tight))
+    for solution, bounds in ((free, limits), (limited, tight)):
+        q = solution.trajectory.q
+        velocity = np.diff(q, axis=0) / np.diff(solution.trajectory.time)[:, None]
+        assert (np.abs(velocity) <= bounds.velocity * (1 + 1e-6)).all()
+        assert ((q >= bounds.lower - 1e-8) & (q <= bounds.upper + 1e-8)).all()
+    assert 0.0528 < free.statistics["cost"] < 0.0540  # simulation 2: 0.0528
+    assert limited.statistics["cost"] > free.statistics["cost"]
+
+
+def test_impossible_limits(line: Problem, limits: Limits) -> None:
+    (only,) = solve(
+        replace(line, limits=replace(limits, velocity=np.full(3, 0.1))), DynamicProgrammingOptions(nodes=90)
+    )
+    assert only.status is Status.INFEASIBLE
+    assert "keeps the limits" in only.message
+
+
+def test_cyclic(line: Problem, limits: Limits) -> None:
+    """Global paper, simulation 5 (printed 0.0554), and the cheaper posture that its velocity limit excludes."""
+    start = line.task.value(Q_INIT[None])[0]
+    reference = Reference(circle(start, 180.0, 0.05), RaisedCosine(1.0))
+    problem = replace(line, reference=reference, boundary=Boundary.CYCLIC)
+    best = solve(replace(problem, limits=limits), DynamicProgrammingOptions())[0]
+    np.testing.assert_allclose(best.trajectory.q[-1], best.trajectory.q[0], atol=1e-12)
+    assert best.statistics["cost"] == pytest.approx(0.0554, abs=best.statistics["grid_error"])
+    free = solve(problem, DynamicProgrammingOptions())[0]
+    assert 0.0378 < free.statistics["cost"] < 0.0386
+
+
+def test_cyclic_search_agrees_with_every_start(line: Problem) -> None:
+    start = line.task.value(Q_INIT[None])[0]
+    problem = replace(
+        line, reference=Reference(circle(start, 180.0, 0.05), RaisedCosine(1.0)), boundary=Boundary.CYCLIC
+    )
+    grid = make_grid(problem, np.linspace(0, 1, 9), 60)
+    every = round_trips(grid, np.arange(len(grid.layers[0].q)))
+    assert paths(grid, Boundary.CYCLIC)[1].min() == pytest.approx(every.min(), rel=1e-12)
+
+
+def test_minima_wrap_around_each_loop() -> None:
+    value = np.array([1.0, 2.0, 3.0, 2.0, 5.0, np.inf, 4.0, 6.0])
+    np.testing.assert_array_equal(minima(value, (4, 4)), [0, 4, 6])
+
+
+def test_unsupported(line: Problem) -> None:
+    with pytest.raises(InputError, match="first order"):
+        solve(replace(line, objective=Objective(0.0, 1.0)), DynamicProgrammingOptions())
+    with pytest.raises(InputError, match="does not end where it starts"):
+        solve(replace(line, boundary=Boundary.CYCLIC), DynamicProgrammingOptions())

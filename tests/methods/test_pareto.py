@@ -1,0 +1,119 @@
+"""The front of the Global paper's Fig. 14 problem, on fewer knots and with fewer starts than the paper's."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+from hydra import compose, initialize_config_dir
+
+from pipeline.build.problem import prepare
+from pipeline.common.workers import Workers
+from pipeline.config.compose import checked
+from pipeline.config.methods import GlobalOptions, ParetoOptions
+from pipeline.evaluation.evaluation import Evaluation, evaluate
+from pipeline.methods import global_planner, pareto
+from pipeline.problem.objective import IntegralBounds, Objective
+from pipeline.problem.problem import Problem
+from pipeline.problem.solution import Status
+from pipeline.program.program import Transcription
+from pipeline.run.main import CONF
+from pipeline.studies import front
+
+FEW = GlobalOptions(configurations=10, candidates=100, optimised=8)
+OPTIONS = ParetoOptions(steps=4)
+
+
+@pytest.fixture(scope="module")
+def problem() -> Problem:
+    with initialize_config_dir(CONF, version_base="1.3"):
+        return prepare(checked(compose("config", overrides=["+experiment=pareto", "timing.steps=26"])))
+
+
+@pytest.fixture(scope="module")
+def evaluations(problem: Problem) -> list[Evaluation]:
+    return [evaluate(problem, solution) for solution in pareto.solve(problem, OPTIONS, FEW)]
+
+
+@pytest.fixture(scope="module")
+def table(evaluations: list[Evaluation]) -> pd.DataFrame:
+    made = front.table(evaluations)
+    assert made is not None
+    return made
+
+
+@pytest.mark.slow
+def test_the_ends_are_the_single_objective_optima(problem: Problem, table: pd.DataFrame) -> None:
+    for name, row in (("kinetic_energy", table.iloc[0]), ("torque", table.iloc[-1])):
+        weights = {"kinetic_energy": 0.0, "torque": 0.0, name: 1.0}
+        alone = global_planner.solve(replace(problem, objective=Objective(**weights)), FEW)[0]
+        found = evaluate(problem, alone)
+        best = found.energy_integral[-1] if name == "kinetic_energy" else found.torque_integral[-1]
+        assert row["extreme"]
+        assert row[name] == pytest.approx(best, rel=1e-6)
+
+
+@pytest.mark.slow
+def test_no_reported_point_is_dominated_and_every_bound_is_met(table: pd.DataFrame) -> None:
+    assert len(table) == 2 * OPTIONS.steps
+    good = table[table["status"] == "optimal"]
+    assert len(good) >= 2 * OPTIONS.steps - 1
+    values = good[["kinetic_energy", "torque"]].to_numpy()
+    for i, value in enumerate(values):
+        assert not any((other < value * (1 - 1e-6)).all() for j, other in enumerate(values) if j != i)
+    assert table["bound_excess"].dropna().max() <= 1e-6
+    assert (table["bound_excess"].dropna() > -1e-3).all()  # a bound that does not bind states no trade
+    assert good["knee"].sum() == 1
+    assert set(good["direction"]) == {"minimise:kinetic_energy", "minimise:torque"}
+
+
+@pytest.mark.slow
+def test_limits_and_path_are_kept_by_every_point(problem: Problem, evaluations: list[Evaluation]) -> None:
+    for e in evaluations:
+        assert e.status is Status.SOLVED
+        assert e.tracking_error.max() <= 1e-8
+        assert np.abs(e.qd).max() <= 3.8 * (1 + 1e-6)
+        assert (e.q <= problem.bounds.upper + 1e-6).all()
+        assert (e.q >= problem.bounds.lower - 1e-6).all()
+
+
+@pytest.mark.slow
+def test_the_front_does_not_depend_on_the_workers(problem: Problem, evaluations: list[Evaluation]) -> None:
+    again = pareto.solve(problem, OPTIONS, FEW, workers=Workers(2))
+    for solution, e in zip(again, evaluations, strict=True):
+        np.testing.assert_array_equal(solution.trajectory.q, e.q)
+
+
+@pytest.mark.slow
+def test_weighting_gives_points_that_the_epsilon_constraint_does_not_beat(
+    problem: Problem, table: pd.DataFrame
+) -> None:
+    weighted = front.table(
+        [evaluate(problem, s) for s in pareto.solve(problem, replace(OPTIONS, method="weighting"), FEW)]
+    )
+    assert weighted is not None
+    assert len(weighted) == len(table)
+    both = pd.concat([table, weighted])[["kinetic_energy", "torque"]].to_numpy()
+    assert not front.dominated(both)[len(table) :].any()
+
+
+def test_a_bounded_integral_is_met_exactly(problem: Problem) -> None:
+    """Bound the energy between its optimum and what the least torques need: the bound binds."""
+    start = global_planner.solve(problem, replace(FEW, optimised=2))[0].trajectory.q
+    free = evaluate(problem, global_planner.solve(problem, replace(FEW, optimised=2))[0])
+    bound = 1.05 * free.energy_integral[-1]
+    stated = replace(problem, objective=Objective(0.0, 1.0), integral_bounds=IntegralBounds(kinetic_energy=bound))
+    q, outcome, _ = Transcription(stated, problem.times, start).solve()
+    assert outcome.converged
+    solution = replace(free.solution, trajectory=replace(free.solution.trajectory, q=q))
+    assert evaluate(problem, solution).energy_integral[-1] == pytest.approx(bound, rel=1e-6)
+
+
+def test_an_extreme_that_cannot_be_found_is_said(problem: Problem) -> None:
+    tight = replace(problem, limits=replace(problem.bounds, velocity=np.full(3, 0.5)))
+    (answer,) = pareto.solve(tight, OPTIONS, replace(FEW, optimised=2, candidates=20))
+    assert answer.status is Status.INFEASIBLE
+    assert "extreme of kinetic_energy" in answer.message
+    assert "velocity limit" in answer.message

@@ -1,0 +1,151 @@
+"""The exported motion: a smooth curve at the rate asked for, judged by what it does between knots and samples too."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.build.problem import prepare
+from pipeline.config.methods import GlobalOptions
+from pipeline.evaluation.evaluation import Evaluation, evaluate
+from pipeline.methods import global_planner
+from pipeline.model.clearance import Obstacles
+from pipeline.path.timing import ConstantSpeed
+from pipeline.problem.limits import Limits
+from pipeline.problem.problem import Problem
+from pipeline.problem.solution import Solution, Status, Trajectory
+from pipeline.robot.shapes import Shape
+from pipeline.studies.export import Resampled, resample, sentence
+from pipeline.studies.studies import compute
+from tests.support import composed
+
+FEW = GlobalOptions(candidates=60, optimised=2)
+Case = tuple[Problem, Evaluation]
+
+
+def solved(*words: str) -> Case:
+    problem = prepare(composed(*words))
+    return problem, evaluate(problem, global_planner.solve(problem, FEW)[0])
+
+
+@pytest.fixture(scope="module")
+def line() -> Case:
+    return solved("path.length=0.2", "timing.duration=2", "timing.steps=20")
+
+
+@pytest.fixture(scope="module")
+def cycle() -> Case:
+    return solved("path=circle", "boundary=cyclic", "timing.duration=2", "timing.steps=24")
+
+
+@pytest.mark.parametrize("rate", [100.0, 30.0, 7.0, 1000.0])
+def test_the_rate_and_the_last_sample(line: Case, rate: float) -> None:
+    motion = resample(*line, rate)
+    assert (motion.time[0], motion.time[-1]) == (0.0, 2.0)
+    step = np.diff(motion.time)
+    np.testing.assert_allclose(step[:-1], 1 / rate, rtol=1e-9)
+    assert 1e-9 < step[-1] <= 1 / rate + 1e-9
+    assert len(motion.time) == int(np.ceil(2.0 * rate - 1e-9)) + 1
+    assert (motion.method, motion.optimum) == ("global", 1)
+
+
+def test_the_curve_goes_through_the_knots_from_rest_to_rest(line: Case) -> None:
+    motion = resample(*line, 100.0)  # every tenth sample is a knot
+    np.testing.assert_allclose(motion.q[::10], line[1].q, atol=1e-12)
+    np.testing.assert_allclose(motion.qd[[0, -1]], 0.0, atol=1e-12)
+
+
+def assert_consistent(motion: Resampled) -> None:
+    """Velocities and accelerations are those of the positions, by central differences."""
+    for value, rate in ((motion.q, motion.qd), (motion.qd, motion.qdd)):
+        by_difference = (value[2:] - value[:-2]) / (motion.time[2:] - motion.time[:-2])[:, None]
+        scale = np.abs(rate).max()
+        assert np.abs(by_difference - rate[1:-1]).max() < 2e-3 * scale
+
+
+def test_derivatives_are_those_of_the_positions(line: Case, cycle: Case) -> None:
+    assert_consistent(resample(*line, 2000.0))
+    assert_consistent(resample(*cycle, 2000.0))
+
+
+def test_a_cyclic_motion_can_be_repeated(cycle: Case) -> None:
+    motion = resample(*cycle, 50.0)
+    for values in (motion.q, motion.qd, motion.qdd):
+        np.testing.assert_allclose(values[-1], values[0], atol=1e-9 * np.abs(values).max())
+    assert np.abs(motion.qd[0]).max() > 0.01, "a cycle that starts at rest shows nothing"
+
+
+def test_a_path_that_is_entered_at_speed_is_not_forced_to_rest(line: Case) -> None:
+    problem, motion = line
+    moving = replace(problem, reference=replace(problem.reference, timing=ConstantSpeed(2.0)))
+    q = motion.q[0] + np.linspace(0.0, 0.4, 21)[:, None] * np.ones(3)
+    straight = evaluate(moving, Solution("global", Trajectory(motion.time, q), Status.SOLVED))
+    np.testing.assert_allclose(resample(moving, straight, 100.0).qd, 0.2, atol=1e-9)
+
+
+def limited(case: Case, **bounds: float | list[float]) -> Problem:
+    free = Limits.none(3)
+    values = {name: np.broadcast_to(bound, 3).astype(float) for name, bound in bounds.items()}
+    return replace(case[0], limits=replace(free, **values))
+
+
+@pytest.mark.parametrize("rate", [500.0, 1.5])
+def test_a_limit_that_only_the_curve_exceeds_is_reported(line: Case, rate: float) -> None:
+    """The knots keep it; so do the samples of a slow rate."""
+    problem, evaluation = line
+    fine = resample(problem, evaluation, 500.0)
+    row, joint = np.unravel_index(np.argmax(np.abs(fine.qd)), fine.qd.shape)
+    peak = float(np.abs(fine.qd)[row, joint])
+    asked = limited(line, velocity=peak / 1.01)
+    motion = resample(asked, evaluation, rate)
+    assert motion.limit_excess["velocity"] == pytest.approx(0.01, abs=2e-3)
+    time, name = motion.worst["velocity"]
+    assert name == f"joint{joint + 1}"
+    assert time == pytest.approx(fine.time[row], abs=0.03)
+    assert not motion.keeps_limits
+    said = sentence(motion)
+    assert f"exceeds the velocity limit of joint{joint + 1} by " in said
+    assert f"at t = {time:.3g} s" in said
+
+
+def test_torques_are_judged_as_the_curve_needs_them(line: Case) -> None:
+    problem, evaluation = line
+    motion = resample(limited(line, torque=1e-3), evaluation, 1000.0)
+    tau = problem.task.arm.inverse_dynamics(motion.q, motion.qd, motion.qdd)
+    assert motion.limit_excess["torque"] == pytest.approx(np.abs(tau).max() / 1e-3 - 1, rel=1e-6)
+
+
+def test_limits_that_are_kept_and_limits_that_are_not_there(line: Case) -> None:
+    kept = resample(limited(line, velocity=100.0), line[1], 100.0)
+    assert kept.keeps_limits
+    assert sentence(kept).endswith("and meets every limit")
+    assert sentence(resample(*line, 100.0)).endswith("has no limits to check it against")
+    assert resample(*line, 100.0).tracking_error < 1e-4
+
+
+# --- which motion is sent -------------------------------------------------------------------------------------------
+
+
+def test_the_best_motion_is_the_cheapest_that_hits_nothing() -> None:
+    """A method that promises no clearance goes through the ball: cheaper, and not to be sent."""
+    ball = Shape("ball", "sphere", (0.04,), (0.69, 0.49, 0.0))
+    words = ("robot=planar4r", "path.length=0.3", "path.direction=170", "timing.duration=2", "timing.steps=24")
+    config = composed(*words)
+    free = prepare(config)
+    there = replace(free, obstacles=Obstacles((ball,), 0.03))
+    through = evaluate(there, replace(global_planner.solve(free, FEW)[0], method="lsv", limits_kept=()))
+    around = evaluate(there, global_planner.solve(there, FEW)[0])
+    assert through.status is around.status is Status.SOLVED
+    assert through.objective < around.objective
+    sent = compute(there, config, [through, around]).exported
+    assert sent is not None
+    assert sent.method == "global"
+    assert sent.limit_excess["clearance"] <= 0
+    assert compute(there, config, [through]).exported is None
+    named = composed(*words, "export.method=lsv")
+    sent = compute(there, named, [through, around]).exported
+    assert sent is not None
+    assert "exceeds the clearance limit by" in sentence(sent)
+    assert compute(there, composed(*words, "export.method=none"), [through, around]).exported is None
