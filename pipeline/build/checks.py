@@ -1,0 +1,67 @@
+"""Refuse what no motion can meet, before anything is solved."""
+
+from __future__ import annotations
+
+from pipeline.common.errors import ConfigError
+from pipeline.common.errors import PathError
+from pipeline.model.clearance import Clearance
+from pipeline.model.kinematics import project
+from pipeline.problem.problem import Boundary
+from pipeline.problem.problem import Problem
+import numpy as np
+
+def check_problem(problem: Problem) -> None:
+    """Refuse what no motion can meet: contradicting limits, a fixed start outside them, an open path for a cycle."""
+    limits, names = problem.bounds, problem.task.arm.description.joints
+    for joint in np.flatnonzero(limits.lower >= limits.upper):
+        raise ConfigError(
+            f"limits.lower of {names[joint]} ({limits.lower[joint]:.4g}) is not below limits.upper ({limits.upper[joint]:.4g})"
+        )
+    if problem.boundary is Boundary.FIXED:
+        outside = np.flatnonzero((problem.q_init < limits.lower) | (problem.q_init > limits.upper))
+        for joint in outside:
+            raise ConfigError(
+                f"robot.q_init of {names[joint]} is {problem.q_init[joint]:.4g}, outside its limits "
+                f"{limits.lower[joint]:.4g} to {limits.upper[joint]:.4g}, and boundary = fixed starts there"
+            )
+        if problem.obstacles is not None:
+            distance, link, obstacle = Clearance(problem.task.arm, problem.obstacles).closest(problem.q_init)
+            if distance < problem.obstacles.margin:
+                raise ConfigError(
+                    f"robot.q_init: {link} is {distance:.3g} m from obstacle {obstacle}, less than obstacles.margin = "
+                    f"{problem.obstacles.margin:g} m, and boundary = fixed starts there"
+                )
+    if problem.boundary is Boundary.CYCLIC:
+        ends = problem.reference.position(np.array([0.0, problem.reference.duration]))
+        gap = float(np.linalg.norm(ends[1] - ends[0]))
+        if gap > 1e-9:
+            raise PathError(
+                f"boundary = cyclic: the path ends {gap:.3g} m{' and rad' * (len(ends[0]) > 3)} from where it starts; "
+                "a cycle needs a closed path"
+            )
+
+
+def require_reach(problem: Problem) -> None:
+    """Refuse a path that leaves the arm's reach, saying where along it and by how much."""
+    task, geometry = problem.task, problem.reference.geometry
+    s = np.linspace(0.0, geometry.length, 101)
+    points = geometry.sample(s)[0]
+    if problem.reference.orientation is not None:
+        points = np.hstack([points, problem.reference.orientation.sample(s)[0]])
+    # From the nearest of several configurations: one start alone can get stuck although the point can be reached.
+    rng = np.random.default_rng(0)
+    guesses = np.concatenate([problem.q_init[None], rng.uniform(-np.pi, np.pi, (11, task.arm.n))])
+    gap = np.full(len(points), np.inf)
+    for guess in guesses:
+        open_points = gap > 1e-6
+        if not open_points.any():
+            return
+        _, left = project(task, np.tile(guess, (int(open_points.sum()), 1)), points[open_points])
+        gap[open_points] = np.minimum(gap[open_points], left)
+    out = np.flatnonzero(gap > 1e-6)
+    if out.size:
+        worst = int(np.argmax(gap))
+        raise PathError(
+            f"path: out of reach from {s[out[0]]:.3g} m along its {geometry.length:.3g} m on; "
+            f"the arm misses it by up to {gap[worst]:.3g} m{' and rad' * (points.shape[1] > 3)} (at {s[worst]:.3g} m)"
+        )

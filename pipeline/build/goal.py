@@ -1,0 +1,74 @@
+"""Objective, limits and obstacles of a configuration."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pipeline.build.robot import make_shape
+from pipeline.common.arrays import Array
+from pipeline.common.errors import ConfigError
+from pipeline.config.goal import LimitsConfig
+from pipeline.config.goal import WeightedConfig
+from pipeline.config.robot import ObstaclesConfig
+from pipeline.config.run import RunConfig
+from pipeline.model.arm import Arm
+from pipeline.model.clearance import Obstacles
+from pipeline.problem.limits import Limits
+from pipeline.problem.objective import Objective
+from pipeline.problem.secondary import Secondary
+from typing import Any
+import numpy as np
+
+def make_limits(limits: LimitsConfig, arm: Arm) -> Limits:
+    """The description's limits as far as `kind` takes them, overridden by the values given."""
+    description, free = arm.description, np.full(arm.n, np.inf)
+    joint, all_of_them = limits.kind != "none", limits.kind == "joint_torque_power"
+
+    def bound(key: str, own: Array) -> Array:
+        given = getattr(limits, key)
+        if given is None:
+            return own
+        if isinstance(given, list) and len(given) != arm.n:
+            raise ConfigError(f"limits.{key} has {len(given)} values, the arm has {arm.n} moving joints")
+        return np.broadcast_to(np.asarray(given, dtype=float), arm.n).copy()
+
+    return Limits(
+        lower=bound("lower", description.lower if joint else -free),
+        upper=bound("upper", description.upper if joint else free),
+        velocity=bound("velocity", description.velocity if joint else free),
+        torque=bound("torque", description.effort if all_of_them else free),
+        power=bound("power", free),
+        attitude=np.inf if limits.attitude is None else limits.attitude,
+    )
+
+
+def make_objective(config: RunConfig, arm: Arm) -> Objective:
+    """The objective; joints are centred in the ranges of the description, or those that `limits` gives."""
+    own = config.objective
+    weights: dict[str, Any] = {"kinetic_energy": 0.0, **own.weights}
+    if isinstance(own, WeightedConfig) and abs(sum(own.weights.values()) - 1.0) > 1e-9:
+        names = " + ".join(f"objective.{name}" for name in own.weights)
+        raise ConfigError(f"{names} = {sum(own.weights.values()):g}: the weights must add up to 1")
+    if not any(own.weights.values()):
+        raise ConfigError(f"objective = {own.kind}: all its weights are zero")
+    if not own.criteria:
+        return Objective(**weights)
+    ranges = make_limits(replace(config.limits, kind="joint"), arm)
+    if "joint_centering" in own.criteria and not np.isfinite(ranges.upper - ranges.lower).any():
+        raise ConfigError(
+            f"objective.secondary = {own.secondary}: {arm.description.name} states no joint limits to centre its joints in; "
+            "give limits.lower and limits.upper"
+        )
+    return Objective(**weights, secondary=Secondary(own.criteria, own.k0, ranges.lower, ranges.upper))
+
+
+def make_obstacles(obstacles: ObstaclesConfig, arm: Arm) -> Obstacles | None:
+    if not obstacles.shapes:
+        return None
+    if not arm.description.collision:
+        meshes = f" (those of {', '.join(arm.description.meshes)} are meshes)" if arm.description.meshes else ""
+        raise ConfigError(
+            f"obstacles.shapes: {arm.description.name} has no primitive collision shapes{meshes}; give spheres, boxes or "
+            "capsules in robot.collision"
+        )
+    shapes = tuple(make_shape(name, shape) for name, shape in obstacles.shapes.items())
+    return Obstacles(shapes, obstacles.margin, obstacles.influence)
