@@ -16,7 +16,8 @@ from scipy.interpolate import CubicSpline
 from pipeline.common.arrays import Array
 from pipeline.common.workers import Workers
 from pipeline.config.methods import GlobalOptions
-from pipeline.model.clearance import Clearance, Obstacles
+from pipeline.model.clearance import Clearance
+from pipeline.model.obstacles import Obstacles
 from pipeline.model.kinematics import wrap
 from pipeline.problem.costs import SECOND_ORDER, objective_values
 from pipeline.problem.lagrangian import Lagrangian
