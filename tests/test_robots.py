@@ -25,7 +25,7 @@ from pipeline.problem.limits import Limits
 from pipeline.problem.objective import IntegralBounds, Objective
 from pipeline.problem.problem import Boundary, Problem
 from pipeline.problem.solution import Status
-from pipeline.program.program import Transcription
+from pipeline.program.transcription import transcribe
 from pipeline.search.population import population
 from pipeline.search.selection import diverse
 from tests.benchmarks.peer import PlanarArm, kinetic_energy_program, solve
@@ -66,8 +66,8 @@ def everything(name: str, rng: np.random.Generator) -> Problem:
 def test_every_row_of_the_program_at_100_random_configurations(name: str, rng: np.random.Generator) -> None:
     """Along random directions, all constraints at once: their Jacobian against central differences."""
     problem = everything(name, rng)
-    made = Transcription(problem, problem.times, within_limits(problem.task.arm, 100, rng))
-    x = 0.3 * rng.normal(size=made.program.num_vars())
+    made = transcribe(problem, problem.times, within_limits(problem.task.arm, 100, rng))
+    x = 0.3 * rng.normal(size=made.drake.num_vars())
     x[: made.y.size] = 0.03 * within_limits(problem.task.arm, 100, rng).ravel()
     jacobian = program_jacobian(made, x)
     for _ in range(4):

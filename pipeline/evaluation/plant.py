@@ -1,6 +1,6 @@
 """One arm in a plant of its own, evaluated knot by knot through Drake's own energy, torque and pose calls.
 
-It shares nothing with the stacked plants and the scaling of the solvers (`arm.py`, `transcription.py`): what the evaluation
+It shares nothing with the stacked plants and the scaling of the solvers (`model/`, `program/`): what the evaluation
 says of a motion comes from here.
 """
 

@@ -25,7 +25,7 @@ from pipeline.problem.objective import Objective
 from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Progress, Solution, Status, Trajectory, no_progress
 from pipeline.program.feasibility import Relaxed, least_violation, violations
-from pipeline.program.program import Transcription
+from pipeline.program.transcription import transcribe
 from pipeline.search.configurations import starting_points
 from pipeline.search.population import population, ranking
 from pipeline.search.selection import distinct, diverse
@@ -254,7 +254,7 @@ def _optimise_lazily(
 
 
 def _optimise(problem: Problem, times: Array, guess: Array, options: GlobalOptions, keep_off: float = 0.0) -> Optimum:
-    program = Transcription(problem, times, guess, keep_off=keep_off)
+    program = transcribe(problem, times, guess, keep_off=keep_off)
     last = len(times) == len(problem.times)
     q, outcome, iterations = program.solve(
         tolerance=options.tolerance if last else max(options.tolerance, ROUGH_TOLERANCE),

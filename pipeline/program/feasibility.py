@@ -12,7 +12,7 @@ from pipeline.model.base import FloatingArm
 from pipeline.model.clearance import Clearance, Obstacles
 from pipeline.problem.costs import integrals, velocities
 from pipeline.problem.problem import Problem
-from pipeline.program.program import Transcription
+from pipeline.program.transcription import transcribe
 
 UNITS = {"position": "rad", "velocity": "rad/s", "torque": "N m", "power": "W", "clearance": "m", "attitude": "rad"}
 
@@ -127,7 +127,7 @@ def least_violation(problem: Problem, times: Array, guesses: list[Array]) -> Rel
 def _relaxed(problem: Problem, times: Array, guesses: list[Array], kinds: list[str]) -> Relaxed | None:
     best: Relaxed | None = None
     for guess in guesses:
-        q, outcome, _ = Transcription(problem, times, guess, elastic=kinds).solve(tolerance=1e-6, max_iterations=150)
+        q, outcome, _ = transcribe(problem, times, guess, elastic=kinds).solve(tolerance=1e-6, max_iterations=150)
         gap = np.abs(problem.task.error(q, problem.reference.position(times))).max()
         if not outcome.converged or gap > 1e-6:
             continue

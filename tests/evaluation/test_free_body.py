@@ -20,7 +20,7 @@ from pipeline.problem.objective import IntegralBounds, Objective
 from pipeline.problem.problem import Boundary, Problem
 from pipeline.problem.solution import Solution, Status, Trajectory
 from pipeline.program.feasibility import least_violation, violations
-from pipeline.program.program import Transcription
+from pipeline.program.transcription import transcribe
 from tests.program.test_program import program_jacobian, program_value
 from tests.support import composed
 
@@ -328,8 +328,8 @@ def test_derivatives_of_the_whole_program(kind: str, elastic: tuple[str, ...], r
         problem = replace(problem, boundary=Boundary.FREE)
     problem = replace(problem, **changes)
     guess = problem.q_init + np.cumsum(0.05 * rng.normal(size=(14, problem.task.arm.n)), axis=0)
-    made = Transcription(problem, problem.times, guess, elastic=elastic)
-    x = 0.3 * rng.normal(size=made.program.num_vars())
+    made = transcribe(problem, problem.times, guess, elastic=elastic)
+    x = 0.3 * rng.normal(size=made.drake.num_vars())
     x[: made.y.size] = 0.03 * (guess + 0.1 * rng.normal(size=guess.shape)).ravel()
     jacobian, h = program_jacobian(made, x), 1e-6
     for _ in range(6):
