@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import replace
+
+import numpy as np
+
 from pipeline.common.arrays import Array
 from pipeline.common.errors import ConfigError
 from pipeline.config.robot import FreeBaseConfig
@@ -15,7 +18,6 @@ from pipeline.problem.limits import Limits
 from pipeline.problem.problem import Problem
 from pipeline.robot.spacecraft import Spacecraft
 from pipeline.robot.urdf import root_mass
-import numpy as np
 
 REACTIONS = {"reaction_force", "reaction_torque"}
 

@@ -36,7 +36,9 @@ class Clearance:
         bodies = [
             self._plant.GetBodyByName(arm.description.drake_name(str(shape.frame)), parts.model) for shape in shapes
         ]
-        links = [self._add(body, shape, f"link {i}") for i, (body, shape) in enumerate(zip(bodies, shapes, strict=True))]
+        links = [
+            self._add(body, shape, f"link {i}") for i, (body, shape) in enumerate(zip(bodies, shapes, strict=True))
+        ]
         others = [self._add(self._plant.world_body(), shape, f"obstacle {i}") for i, shape in enumerate(solids)]
         self._plant.Finalize()
         moving = [link for link, body in zip(links, bodies, strict=True) if not self._plant.IsAnchored(body)]

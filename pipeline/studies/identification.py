@@ -35,7 +35,7 @@ from pipeline.model.arm import Arm
 from pipeline.model.task import PositionTask
 from pipeline.problem.costs import integrals, velocities
 from pipeline.problem.problem import Problem
-from pipeline.program.program import Transcription
+from pipeline.program.transcription import transcribe
 from pipeline.robot.description import Description
 
 FEW = GlobalOptions(candidates=200, optimised=12)  # starts that find every optimum that is printed
@@ -224,7 +224,7 @@ def _moved(masses: Array, item: tuple[str, str, int, Array]) -> tuple[Array, dic
     name, method, _, q = item
     problem = _problem(name, masses)
     if method == "global":
-        q = Transcription(problem, problem.times, q).solve(tolerance=1e-8, max_iterations=200)[0]
+        q = transcribe(problem, problem.times, q).solve(tolerance=1e-8, max_iterations=200)[0]
     return q, quantities(problem, q)
 
 
