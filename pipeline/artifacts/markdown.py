@@ -11,21 +11,20 @@ import pandas as pd
 
 from pipeline.config.run import RunConfig
 from pipeline.evaluation.evaluation import Evaluation
+from pipeline.problem.integrals import INTEGRALS
 from pipeline.problem.problem import Problem
 from pipeline.studies import certificate, export
 from pipeline.studies.front import hypervolume
 from pipeline.studies.studies import Extras
 
 UNITS = {
-    "kinetic_energy_integral": "J s",
+    **{f"{name}_integral": integral.unit for name, integral in INTEGRALS.items()},
     "kinetic_energy_integral_spline": "J s",
-    "torque_integral": "N² m² s",
     "max_tracking_error": "m",
     "max_tracking_error_between": "m",
     "final_error": "m",
     "max_orientation_error": "rad",
     "max_orientation_error_between": "rad",
-    "velocity_norm_integral": "rad²/s",
     "peak_velocity": "rad/s",
     "peak_torque": "N m",
     "peak_power": "W",
@@ -39,12 +38,9 @@ UNITS = {
     "min_clearance_between": "m",
     "peak_reaction_force": "N",
     "peak_reaction_torque": "N m",
-    "reaction_force_integral": "N² s",
-    "reaction_torque_integral": "N² m² s",
     "max_base_turn": "rad",
     "final_base_turn": "rad",
     "final_base_shift": "m",
-    "base_rotation_integral": "rad²/s",
     "max_floating_path_error": "m",
     "wall_time_s": "s",
 }

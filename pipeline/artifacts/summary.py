@@ -14,6 +14,7 @@ from pipeline.common.files import write_beside
 from pipeline.config.studies import PublishedConfig
 from pipeline.evaluation.evaluation import Evaluation
 from pipeline.model.task import PositionTask
+from pipeline.problem.integrals import INTEGRALS
 from pipeline.problem.problem import Problem
 from pipeline.studies.studies import NOTHING, Extras
 
@@ -42,8 +43,8 @@ def summary(
 
 def _first_order(problem: Problem, e: Evaluation) -> dict[str, Any]:
     """What an objective beyond kinetic energy and torque adds: the whole of it, and its parts."""
-    weights = problem.objective
-    if not weights.velocity_norm and weights.secondary is None:
+    objective = problem.objective
+    if not objective.weight("velocity_norm") and objective.secondary is None:
         return {}
     return {
         "objective": e.objective,
@@ -103,7 +104,8 @@ def _base(problem: Problem, e: Evaluation) -> dict[str, Any]:
     if base.reaction is not None:
         peaks = [float(np.linalg.norm(base.reaction[:, part], axis=1).max()) for part in (slice(3), slice(3, 6))]
         row = dict(zip(("peak_reaction_force", "peak_reaction_torque"), peaks, strict=True))
-        names = ("reaction_force", "reaction_torque") if problem.task.arm.base.count else ()
+        of_held = [name for name, integral in INTEGRALS.items() if integral.base == "held"]
+        names = of_held if problem.task.arm.base.count else []
         return row | {f"{name}_integral": e.integral(name) for name in names}
     floating = base.floating
     return {

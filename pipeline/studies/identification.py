@@ -234,8 +234,8 @@ def quantities(problem: Problem, q: Array) -> dict[str, float]:
     costs, qd = integrals(problem, times, q), velocities(problem, times, q)
     radius = np.linalg.eigvalsh(problem.task.arm.mass_matrix(q))[:, -1]
     row = {
-        "kinetic_energy_integral": costs.kinetic_energy,
-        "torque_integral": costs.torque,
+        "kinetic_energy_integral": costs.integrals["kinetic_energy"],
+        "torque_integral": costs.integrals["torque"],
         "min_spectral_radius": float(radius.min()),
         "min_spectral_radius_time": float(times[radius.argmin()]),
     }

@@ -141,7 +141,10 @@ def test_columns_draw_every_joint(case: Case) -> None:
 
 def test_legend_gives_the_final_integral(case: Case) -> None:
     problem, motions = case
-    motions = [replace(e, energy_integral=np.linspace(0.0, 0.1234 + k, 101)) for k, e in enumerate(motions)]
+    rising = [np.linspace(0.0, 0.1234 + k, 101) for k in range(len(motions))]
+    motions = [
+        replace(e, integrals={**e.integrals, "kinetic_energy": one}) for e, one in zip(motions, rising, strict=True)
+    ]
     shown = texts(figures.energy(problem, motions, "run"))
     for e in motions:
         assert f"{style.name(e.label)}\n{e.energy_integral[-1]:.4g} J s" in shown

@@ -158,4 +158,4 @@ def test_what_it_does_not_serve_is_one_line() -> None:
             pontryagin.check(stated("case1", **other))
     problem = stated("case1")
     with pytest.raises(InputError, match="torque"):
-        pontryagin.check(replace(problem, objective=replace(problem.objective, velocity_norm=0.0, kinetic_energy=0.0)))
+        pontryagin.check(replace(problem, objective=replace(problem.objective, weights={})))

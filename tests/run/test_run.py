@@ -349,7 +349,7 @@ def test_a_value_given_overrides_the_description() -> None:
 def test_boundaries_and_objectives_arrive() -> None:
     problem = prepared("path=circle", "boundary=cyclic", "objective=weighted")
     assert problem.boundary is Boundary.CYCLIC
-    assert (problem.objective.kinetic_energy, problem.objective.torque) == (0.5, 0.5)
+    assert problem.objective.weights == {"kinetic_energy": 0.5, "torque": 0.5}
     gap = problem.reference.position(np.array([0.0, problem.reference.duration]))
     np.testing.assert_allclose(gap[0], gap[1], atol=1e-12)
 

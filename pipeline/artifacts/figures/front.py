@@ -10,20 +10,13 @@ from matplotlib.figure import Figure
 
 from pipeline.artifacts import style
 from pipeline.common.files import write_beside
+from pipeline.problem.integrals import INTEGRALS
 from pipeline.studies.front import hypervolume
-
-LABELS = {
-    "kinetic_energy": "Kinetic-energy integral [J s]",
-    "torque": "Squared-torque integral [N² m² s]",
-    "base_rotation": "Integral of the base's squared angular velocity [rad²/s]",
-    "reaction_force": "Integral of the squared force on the base [N² s]",
-    "reaction_torque": "Integral of the squared torque on the base [N² m² s]",
-}
 
 
 def draw(front: pd.DataFrame, name: str) -> Figure:
     """From the table of `pipeline.front.table`."""
-    objectives = [column for column in LABELS if column in front.columns]
+    objectives = [column for column in INTEGRALS if column in front.columns]
     objectives.sort(key=list(front.columns).index)
     x, y = objectives
     figure = Figure(figsize=(7.4, 5.4), layout="constrained")
@@ -66,14 +59,18 @@ def draw(front: pd.DataFrame, name: str) -> Figure:
         )
     share = hypervolume(good[[x, y]].to_numpy())
     axes.set(
-        xlabel=LABELS[x],
-        ylabel=LABELS[y],
+        xlabel=_label(x),
+        ylabel=_label(y),
         title=f"{name}: Pareto front, hypervolume {share:.3f} of the extremes' rectangle",
     )
     axes.grid(True, color="0.93")
     axes.set_axisbelow(True)
     axes.legend(fontsize=9)
     return figure
+
+
+def _label(name: str) -> str:
+    return f"{INTEGRALS[name].label} [{INTEGRALS[name].unit}]"
 
 
 def write(folder: Path, front: pd.DataFrame, *, name: str) -> Path:
