@@ -14,7 +14,6 @@ from matplotlib.figure import Figure
 from matplotlib.image import imread
 from scipy.spatial import ConvexHull
 
-from pipeline.artifacts import style
 from pipeline.artifacts.figures import motions as figures
 from pipeline.artifacts.figures import solids
 from pipeline.artifacts.figures.panels import thin
@@ -29,6 +28,7 @@ from pipeline.path.timing import RaisedCosine
 from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Solution, Status, Trajectory
 from pipeline.robot.shapes import Shape, capsule
+from pipeline.studies import style
 
 NAMES = ["reference", "energy", "stroboscopic", "joints", "torques", "spectral_radius", "tracking"]
 EVENT = 6.4
