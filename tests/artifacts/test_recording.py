@@ -62,7 +62,7 @@ def case() -> Case:
 
 
 def write(file: Path, problem: Problem, evaluations: Sequence[Evaluation]) -> None:
-    recording.write(file, problem, evaluations, name="line", summary="# A line\n\nthe text", properties=PROPERTIES)
+    recording.save(file, problem, evaluations, name="line", summary="# A line\n\nthe text", properties=PROPERTIES)
 
 
 def chunks(file: Path, content: str) -> list[object]:
