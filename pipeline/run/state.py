@@ -28,7 +28,7 @@ def state(config: RunConfig) -> Problem:
         if asked == config:
             return problem
     problem = prepare(config)
-    if problem.task.arm.base_coordinates:
+    if problem.task.arm.base.count:
         _require_fixed_base(config)
     if "dynamic_programming" in config.methods or (
         "global" in config.methods and config.method.global_.starts != "population"

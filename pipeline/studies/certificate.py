@@ -10,7 +10,7 @@ from scipy.interpolate import CubicSpline
 from pipeline.problem.costs import objective_values
 from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Solution
-from pipeline.program.program import Transcription
+from pipeline.program.transcription import transcribe
 from pipeline.studies.study import Motions, Result
 
 
@@ -56,7 +56,7 @@ def certify(problem: Problem, optimum: Solution, grid_optimum: Solution) -> Cert
     """The planner's optimum carried to the knots of the dynamic programming, where both minimise the same sum."""
     times = grid_optimum.trajectory.time
     guess = CubicSpline(optimum.trajectory.time, optimum.trajectory.q)(times)
-    q, outcome, _ = Transcription(replace(problem, times=times), times, guess).solve()
+    q, outcome, _ = transcribe(replace(problem, times=times), times, guess).solve()
     cost = float(objective_values(problem, times, q[None])[0]) if outcome.converged else float("nan")
     gap = float(grid_optimum.statistics["cost"]) - cost
     return Certificate(cost, gap, float(grid_optimum.statistics["grid_error"]), len(times) - 1)

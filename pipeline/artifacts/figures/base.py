@@ -18,9 +18,9 @@ def base(problem: Problem, evaluations: Sequence[Evaluation], name: str) -> Figu
 
     None of a base that is simply fixed.
     """
-    if not problem.task.arm.base_coordinates:
+    if not problem.task.arm.base.count:
         return None
-    floats = problem.task.arm.floats
+    floats = problem.task.arm.base.kind == "floating"
     figure = new_figure(f"{name}: the base {'floats' if floats else 'is held'}", 10.0, 7.5 if floats else 6.0)
     panels = stacked_panels(figure, problem, 3 if floats else 2)
     labels = ("Turn from the start [deg]", "Shift from the start [m]", r"$\int|\omega|^2\,dt$ [rad$^2$/s]")
