@@ -105,7 +105,7 @@ def _base(problem: Problem, e: Evaluation) -> dict[str, Any]:
         peaks = [float(np.linalg.norm(base.reaction[:, part], axis=1).max()) for part in (slice(3), slice(3, 6))]
         row = dict(zip(("peak_reaction_force", "peak_reaction_torque"), peaks, strict=True))
         of_held = [name for name, integral in INTEGRALS.items() if integral.base == "held"]
-        names = of_held if problem.task.arm.base_coordinates else []
+        names = of_held if problem.task.arm.base.count else []
         return row | {f"{name}_integral": e.integral(name) for name in names}
     floating = base.floating
     return {

@@ -16,8 +16,9 @@ from scipy.interpolate import CubicSpline
 from pipeline.common.arrays import Array
 from pipeline.common.workers import Workers
 from pipeline.config.methods import GlobalOptions
-from pipeline.model.clearance import Clearance, Obstacles
+from pipeline.model.clearance import Clearance
 from pipeline.model.kinematics import wrap
+from pipeline.model.obstacles import Obstacles
 from pipeline.problem.costs import objective_values
 from pipeline.problem.integrals import of_order
 from pipeline.problem.lagrangian import Lagrangian

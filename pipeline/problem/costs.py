@@ -58,7 +58,7 @@ def _entering(problem: Problem, q: Array, last: Array) -> Array:
 
 def row_kinds(arm: Arm) -> list[str]:
     """The integral to which each of the n generalized forces of an arm belongs."""
-    nb = arm.base_coordinates
+    nb = arm.base.count
     forces = nb - 1 if nb == 3 else nb // 2
     return ["reaction_force"] * forces + ["reaction_torque"] * (nb - forces) + ["torque"] * (arm.n - nb)
 
@@ -77,8 +77,6 @@ def integrals(problem: Problem, times: Array, q: Array) -> Costs:
     tau = arm.inverse_dynamics(q[1:], qd[1:], qdd)
 
     def total(integral: Integral) -> float:
-        if integral.base == "floating" and not arm.floats:
-            return 0.0
         only = {integral.name: 1.0}
         if integral.order == 2:
             return float(squares(arm, tau, only) @ dt)

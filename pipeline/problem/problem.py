@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 from pipeline.common.arrays import Array
 from pipeline.common.errors import InputError
-from pipeline.model.clearance import Obstacles
+from pipeline.model.obstacles import Obstacles
 from pipeline.model.task import Task
 from pipeline.path.reference import Reference
 from pipeline.problem.integrals import ByIntegral

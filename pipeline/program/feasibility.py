@@ -8,8 +8,8 @@ import numpy as np
 
 from pipeline.common.arrays import Array
 from pipeline.model.arm import Arm
-from pipeline.model.base import FloatingArm
-from pipeline.model.clearance import Clearance, Obstacles
+from pipeline.model.clearance import Clearance
+from pipeline.model.obstacles import Obstacles
 from pipeline.problem.costs import integrals, velocities
 from pipeline.problem.problem import Problem
 from pipeline.program.transcription import transcribe
@@ -62,9 +62,9 @@ def violations(problem: Problem, times: Array, q: Array) -> list[Violation]:
 
 def _turned(problem: Problem, times: Array, q: Array) -> Violation | None:
     arm, bound = problem.task.arm, problem.bounds.attitude
-    if not np.isfinite(bound) or not isinstance(arm, FloatingArm):
+    if not np.isfinite(bound):
         return None
-    angle = np.arccos(np.clip(arm.attitude_cosine(q)[0], -1.0, 1.0))
+    angle = np.arccos(np.clip(arm.base.attitude_cosine(q)[0], -1.0, 1.0))
     knot = int(np.argmax(angle))
     return Violation(
         "attitude", "the base", bound, float(angle[knot]), float(times[knot]), float(angle[knot] / bound - 1)

@@ -41,7 +41,7 @@ class Program:
     ) -> None:
         self.problem, self.times, self.elastic, self.keep_off = problem, times, elastic, keep_off
         self.task, self.arm, self.limits = problem.task, problem.task.arm, problem.bounds
-        self.n, self.nb, self.intervals = self.arm.n, self.arm.base_coordinates, len(times) - 1
+        self.n, self.nb, self.intervals = self.arm.n, self.arm.base.count, len(times) - 1
         self.first_free = 1 if problem.boundary is Boundary.FIXED else 0
         self.closed = problem.boundary is Boundary.CYCLIC
         self.dt = np.diff(times)

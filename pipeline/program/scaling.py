@@ -54,7 +54,7 @@ def lifted(problem: Problem) -> Forces:
     limited = bool(np.isfinite(limits.torque).any() or np.isfinite(limits.power).any())
     kinds = row_kinds(arm)
     counted = {*objective.weights, *problem.bounds_of_integrals}
-    rows = [row for row, kind in enumerate(kinds) if kind in counted or (limited and row >= arm.base_coordinates)]
+    rows = [row for row, kind in enumerate(kinds) if kind in counted or (limited and row >= arm.base.count)]
     own = [kinds[row] for row in rows]
     return Forces(rows, own, np.array([objective.weight(kind) for kind in own]))
 
@@ -107,12 +107,12 @@ def _energy_units(problem: Problem, dt: Array, guess: Guess, cost: float) -> Arr
     arm, lagrangian, q = problem.task.arm, Lagrangian(problem.task, problem.objective), guess.q
     if not (lagrangian.is_quadratic or of_order(problem.bounds_of_integrals, 1)):
         return None
-    nb, energy = arm.base_coordinates, guess.costs.integrals["kinetic_energy"]
+    nb, energy = arm.base.count, guess.costs.integrals["kinetic_energy"]
     energy = energy if energy > 0 else 1.0
     # Half |w|^2 is the energy's share of the cost, or its ratio to the guess's where it is only bounded.
     share = 1 / cost if lagrangian.is_quadratic else 1 / energy
     metric = lagrangian.metric(q[1:]) if lagrangian.is_quadratic else arm.mass_matrix(q[1:])
-    if nb and not arm.floats:
+    if arm.base.kind == "held":
         # Coordinates that are held need no metric, and a base without mass has none.
         metric[:, :nb], metric[:, :, :nb] = 0.0, 0.0
         metric[:, range(nb), range(nb)] = 1.0

@@ -142,11 +142,12 @@ def masses_of(description: Description) -> Array:
 
 
 def with_masses(arm: Arm, masses: Array) -> Arm:
-    """The same arm with other masses (n,) [kg]; lengths, centres of gravity and moments of inertia stay."""
-    root, elements = _mass_elements(arm.description)
+    """The same arm with other masses [kg] (joints,); all else of its links, its mounting and its base stay."""
+    description = arm.on_fixed_base.description
+    root, elements = _mass_elements(description)
     for element, mass in zip(elements, masses, strict=True):
         element.set("value", repr(float(mass)))
-    return Arm(replace(arm.description, xml=ET.tostring(root, encoding="unicode")), tuple(arm.offset))
+    return Arm(replace(description, xml=ET.tostring(root, encoding="unicode")), arm.mounting, arm.base)
 
 
 def _mass_elements(description: Description) -> tuple[ET.Element, list[ET.Element]]:

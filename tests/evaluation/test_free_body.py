@@ -14,7 +14,6 @@ from pipeline.evaluation.evaluation import Evaluation, evaluate
 from pipeline.evaluation.free_body import BasePlant, integrate
 from pipeline.methods import global_planner, lsv
 from pipeline.methods.pmke import predictive as pmke
-from pipeline.model.base import FloatingArm
 from pipeline.problem.costs import integrals
 from pipeline.problem.objective import Objective
 from pipeline.problem.problem import Boundary, Problem
@@ -40,11 +39,6 @@ def stated(*overrides: str) -> tuple[Problem, Solution]:
 def solved(*overrides: str) -> tuple[Problem, Evaluation]:
     problem, solution = stated(*overrides)
     return problem, evaluate(problem, solution)
-
-
-def floating(problem: Problem) -> FloatingArm:
-    assert isinstance(problem.task.arm, FloatingArm)
-    return problem.task.arm
 
 
 STARTS = {"fixed": (), "free": ("boundary=free",), "cyclic": CIRCLE}
@@ -89,8 +83,8 @@ def test_the_path_error_is_of_second_order_in_the_step() -> None:
     errors = []
     for steps in (50, 100, 200):
         problem, solution = stated(*ON_BASE[:-2], f"timing.steps={steps}", "method.global.optimised=1")
-        nb = problem.task.arm.base_coordinates
-        found = integrate(problem, floating(problem), solution.trajectory.time, solution.trajectory.q[:, nb:])
+        joints = solution.trajectory.q[:, problem.task.arm.joints]
+        found = integrate(problem, solution.trajectory.time, joints)
         errors.append(found.path_error)
     order = np.log2(np.array(errors[:-1]) / errors[1:])
     assert errors[-1] < 1e-6
@@ -260,8 +254,7 @@ def test_least_reaction_on_a_held_base() -> None:
     words = (*SHORT, "boundary=free", "objective=reaction", "objective.force=0.1")
     problem, e = solved(*words)
     plain, energy = solved(*SHORT, "boundary=free")
-    assert isinstance(problem.task.arm, FloatingArm)
-    assert not problem.task.arm.floats
+    assert problem.task.arm.base.kind == "held"
     assert e.status is Status.SOLVED, e.message
     assert e.objective == pytest.approx(0.1 * e.integral("reaction_force") + e.integral("reaction_torque"))
     costs = integrals(problem, problem.times, e.solution.trajectory.q)

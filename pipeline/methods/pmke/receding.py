@@ -71,8 +71,8 @@ def rollout(problem: Problem, q: Array, targets: Array) -> Array:
 
 def path_weight(arm: Arm, q: Array) -> Array | None:
     """For `project` from q (K, n): least joint displacements, the base following them; None: it stands still."""
-    joints = arm.n - arm.base_coordinates
-    return arm.lift(q, np.tile(np.eye(joints), (len(q), 1, 1))) if arm.base_coordinates else None
+    joints = arm.n - arm.base.count
+    return arm.lift(q, np.tile(np.eye(joints), (len(q), 1, 1))) if arm.base.count else None
 
 
 def solve(problem: Problem, options: PmkeOptions) -> Solution:

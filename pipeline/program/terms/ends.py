@@ -28,7 +28,7 @@ def bound(program: Program) -> None:
         program.drake.AddBoundingBoxConstraint(start, start, program.y[0])
     elif nb:
         program.drake.AddBoundingBoxConstraint(start[:nb], start[:nb], program.y[0, :nb])
-    if nb and not program.arm.floats:
+    if program.arm.base.kind == "held":
         still = np.tile(start[:nb], program.intervals)
         program.drake.AddBoundingBoxConstraint(still, still, program.y[1:, :nb].ravel())
     if program.closed:
