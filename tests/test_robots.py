@@ -30,9 +30,8 @@ from pipeline.robot.mounting import Mounting
 from pipeline.search.population import population
 from pipeline.search.selection import diverse
 from tests.benchmarks.peer import PlanarArm, kinetic_energy_program, solve
-from tests.model.test_clearance import BALL, with_shapes
 from tests.program.test_program import program_jacobian, program_value
-from tests.support import ROBOTS, composed, robot, within_limits
+from tests.support import BALL, ROBOTS, composed, robot, with_shapes, within_limits
 
 
 def everything(name: str, rng: np.random.Generator) -> Problem:

@@ -39,9 +39,7 @@ def evaluations(problem: Problem) -> list[Evaluation]:
 
 @pytest.fixture(scope="module")
 def table(evaluations: list[Evaluation]) -> pd.DataFrame:
-    made = front.table(evaluations)
-    assert made is not None
-    return made
+    return front.table(evaluations)
 
 
 @pytest.mark.slow
@@ -92,7 +90,6 @@ def test_weighting_gives_points_that_the_epsilon_constraint_does_not_beat(
     weighted = front.table(
         [evaluate(problem, s) for s in pareto.solve(problem, replace(OPTIONS, method="weighting"), FEW)]
     )
-    assert weighted is not None
     assert len(weighted) == len(table)
     both = pd.concat([table, weighted])[["kinetic_energy", "torque"]].to_numpy()
     assert not front.dominated(both)[len(table) :].any()
