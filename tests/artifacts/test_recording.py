@@ -29,7 +29,7 @@ from pipeline.methods.global_planner.planner import global_planner
 from pipeline.methods.lsv import lsv
 from pipeline.methods.registry import METHODS
 from pipeline.model.arm import Arm
-from pipeline.model.clearance import Obstacles
+from pipeline.model.obstacles import Obstacles
 from pipeline.model.task import PositionTask
 from pipeline.path.curves import Line, direction_vector
 from pipeline.path.reference import Reference
