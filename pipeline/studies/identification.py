@@ -32,8 +32,8 @@ from pipeline.config.compose import experiment
 from pipeline.config.documents import half_width
 from pipeline.config.methods import GlobalOptions
 from pipeline.config.studies import IdentificationConfig
-from pipeline.methods import global_planner, lsv
-from pipeline.methods.pmke import predictive
+from pipeline.methods.method import Context
+from pipeline.methods.registry import METHODS
 from pipeline.model.arm import Arm
 from pipeline.model.task import PositionTask
 from pipeline.problem.costs import integrals, velocities
@@ -217,12 +217,7 @@ def _solve(wanted: Sequence[Key], masses: Array, seed: int, workers: Workers) ->
     motions = {}
     for name, method in dict.fromkeys(key[:2] for key in wanted):
         problem = _problem(name, masses)
-        if method == "lsv":
-            solutions = [lsv.solve(problem)]
-        elif method == "pmke":
-            solutions = [predictive.solve(problem)]
-        else:
-            solutions = global_planner.solve(problem, FEW, seed, workers)
+        solutions = METHODS[method](problem, FEW if method == "global" else None, Context(seed, workers))
         found = {s.optimum: s.trajectory.q for s in solutions if s.found}
         for key in wanted:
             if key[:2] == (name, method):
@@ -305,7 +300,7 @@ def draw(found: Identification, title: str) -> Figure:
         ("residual_printed", "lsv", "printed masses", "x"),
         ("residual_identified", "global", "identified masses", "o"),
     ):
-        axes.plot(numbers[column], place, marker, color=style.METHOD_COLORS[method], markersize=5, label=label)
+        axes.plot(numbers[column], place, marker, color=style.color(method), markersize=5, label=label)
     axes.set_xscale("symlog", linthresh=2.0)
     axes.set_yticks(place, _labels(numbers), fontsize=7.5)
     axes.set_ylim(-0.8, len(numbers) - 0.2)
