@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, get_args
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import Field
 
-from pipeline.config.fields import Number, Switch, Whole, Words, schema
+from pipeline.config.fields import Number, Whole, Words, schema
 from pipeline.config.goal import Integral, Positive
 
 MethodName = Literal[
     "lsv",
     "inertia_weighted",
     "pmke",
+    "receding",
     "global",
+    "pareto",
     "dynamic_programming",
     "calculus_of_variations",
     "pontryagin",
-    "pareto",
+    "pontryagin_as_printed",
 ]
 METHODS: tuple[str, ...] = get_args(MethodName)
 
@@ -29,6 +31,10 @@ Tolerance = Annotated[Positive, Field(description="of the solver, relative to th
 Iterations = Annotated[Whole, Field(ge=1, description="of the solver, at most")]
 Singular = Annotated[
     Positive, Field(description="smallest over largest singular value of J below which a motion counts as singular")
+]
+Prediction = Annotated[
+    Literal["problem", "kinetic_energy", "torque"],
+    Field(description="of a prediction; problem: the problem's, kinetic energy in place of torques"),
 ]
 Drift = Annotated[Positive, Field(description="[m] tracking error above which the motion is not confirmed")]
 
@@ -52,17 +58,7 @@ class PmkeOptions:
     prediction_step: Annotated[Positive, Field(description="[s] spacing of the predicted knots (Delta T)")] = 1.0
     horizon: Annotated[Whole, Field(ge=1, description="predicted knots (h)")] = 2
     update_interval: Annotated[Positive, Field(description="[s] between predictions (I)")] = 0.5
-    objective: Annotated[
-        Literal["problem", "kinetic_energy", "torque"],
-        Field(description="of a prediction; problem: the problem's, kinetic energy in place of torques"),
-    ] = "problem"
-    limits: Annotated[
-        Switch,
-        Field(description="predictions keep all limits and obstacles, and their knots are executed as they are"),
-    ] = False
-    tail: Annotated[
-        Whole, Field(ge=0, description="with limits: coarse knots from the horizon to the end, against dead ends")
-    ] = 8
+    objective: Prediction = "problem"
     interpolation: Annotated[
         Literal["quintic", "cubic"],
         Field(description="through the predicted knots; quintic: as the paper's end conditions need"),
@@ -71,6 +67,20 @@ class PmkeOptions:
     tolerance: Annotated[Positive, Field(description="of a prediction, relative to its energy")] = 1e-8
     singular_value: Singular = 0.03
     max_drift: Drift = 0.01
+
+
+@schema
+class RecedingOptions:
+    """PMKE with limits: a receding horizon that keeps limits and obstacles, and whose knots are executed as they are."""
+
+    prediction_step: Annotated[Positive, Field(description="[s] spacing of the knots")] = 1.0
+    horizon: Annotated[Whole, Field(ge=1, description="predicted knots")] = 2
+    update_interval: Annotated[Positive, Field(description="[s] between predictions")] = 0.5
+    objective: Prediction = "problem"
+    tail: Annotated[
+        Whole, Field(ge=0, description="coarse knots from the horizon to the end of the path, against dead ends")
+    ] = 8
+    tolerance: Annotated[Positive, Field(description="of a prediction, relative to its objective")] = 1e-8
 
 
 @schema
@@ -138,14 +148,8 @@ class CalculusOfVariationsOptions:
 
 @schema
 class PontryaginOptions:
-    """The maximum principle: as the report prints it, and its correct two-point boundary-value problem."""
+    """The maximum principle as the two-point boundary-value problem that it is."""
 
-    formulation: Annotated[
-        Literal["as_printed", "boundary_value", "both"],
-        Field(description="as_printed: the report's eqs (21), (22); boundary_value: the correct problem"),
-    ] = "boundary_value"
-    dt: Annotated[Positive, Field(description="[s] step of the printed formulation")] = 0.01
-    max_drift: Drift = 0.1
     guesses: Annotated[Whole, Field(ge=1, description="motions that the boundary-value problem is started from")] = 24
     intervals: Annotated[Whole, Field(ge=4, description="of the mesh it starts on")] = 40
     tolerance: Annotated[
@@ -158,21 +162,16 @@ class PontryaginOptions:
 
 
 @schema
-class MethodConfig:
-    """Group `method`: the options of every method; the key `methods` says which of them run."""
+class PontryaginAsPrintedOptions:
+    """The maximum principle as the report prints it (eqs (21), (22)), integrated as it stands."""
 
-    lsv: LsvOptions = LsvOptions()
-    inertia_weighted: LsvOptions = LsvOptions()
-    pmke: PmkeOptions = PmkeOptions()
-    global_: Annotated[GlobalOptions, Field(alias="global")] = GlobalOptions()
-    dynamic_programming: DynamicProgrammingOptions = DynamicProgrammingOptions()
-    calculus_of_variations: CalculusOfVariationsOptions = CalculusOfVariationsOptions()
-    pontryagin: PontryaginOptions = PontryaginOptions()
+    dt: Step = 0.01
+    max_drift: Drift = 0.1
 
 
 @schema
 class ParetoOptions:
-    """Pareto front of two integrals: method `pareto`."""
+    """The front of two integrals; `planner` finds its extremes and its first motions."""
 
     method: Annotated[
         Literal["epsilon_constraint", "weighting"], Field(description="how the points between the extremes are found")
@@ -182,3 +181,24 @@ class ParetoOptions:
     rounds: Annotated[Whole, Field(ge=0, description="of starts from both neighbours, at most")] = 3
     tolerance: Tolerance = 1e-8
     max_iterations: Iterations = 200
+    planner: Annotated[GlobalOptions, Field(description="set method.global instead")] = GlobalOptions()
+
+
+@schema
+class MethodConfig:
+    """Group `method`: the options of every method; the key `methods` says which of them run."""
+
+    lsv: LsvOptions = LsvOptions()
+    inertia_weighted: LsvOptions = LsvOptions()
+    pmke: PmkeOptions = PmkeOptions()
+    receding: RecedingOptions = RecedingOptions()
+    global_: Annotated[GlobalOptions, Field(alias="global")] = GlobalOptions()
+    pareto: ParetoOptions = ParetoOptions()
+    dynamic_programming: DynamicProgrammingOptions = DynamicProgrammingOptions()
+    calculus_of_variations: CalculusOfVariationsOptions = CalculusOfVariationsOptions()
+    pontryagin: PontryaginOptions = PontryaginOptions()
+    pontryagin_as_printed: PontryaginAsPrintedOptions = PontryaginAsPrintedOptions()
+
+    def of(self, name: str) -> Any:
+        """The options of the method `name`."""
+        return getattr(self, "global_" if name == "global" else name)

@@ -12,7 +12,7 @@ from pydantic import Field
 
 from pipeline.config.fields import Switch, Text, Whole, WordOrVector, Words, build, schema
 from pipeline.config.goal import BoundaryConfig, KineticEnergyConfig, LimitsConfig, ObjectiveConfig
-from pipeline.config.methods import MethodConfig, MethodName, ParetoOptions
+from pipeline.config.methods import MethodConfig, MethodName
 from pipeline.config.path import CircleConfig, LineConfig, TimingConfig, WaypointsConfig
 from pipeline.config.robot import FixedBaseConfig, FreeBaseConfig, ObstaclesConfig, RobotConfig
 from pipeline.config.studies import CandidateStudyConfig, ClosedLoopConfig, ExportConfig, IdentificationConfig
@@ -64,7 +64,6 @@ class RunConfig:
     method: MethodConfig = MethodConfig()
     parallel: ParallelConfig = ParallelConfig()
     sweep: SweepConfig = SweepConfig()
-    pareto: ParetoOptions = ParetoOptions()
     candidate_study: CandidateStudyConfig = CandidateStudyConfig()
     export: ExportConfig = ExportConfig()
     closed_loop: ClosedLoopConfig = ClosedLoopConfig()
