@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from pipeline.config.documents import Printed
 from pipeline.config.run import RunConfig
 from pipeline.evaluation.evaluation import Evaluation
 from pipeline.problem.problem import Problem
@@ -51,7 +52,12 @@ UNITS = {
 
 
 def markdown(
-    config: RunConfig, problem: Problem, evaluations: Sequence[Evaluation], table: pd.DataFrame, extras: Extras
+    config: RunConfig,
+    problem: Problem,
+    evaluations: Sequence[Evaluation],
+    table: pd.DataFrame,
+    extras: Extras,
+    published: Printed,
 ) -> str:
     """The summary for people: a row per quantity and a column per motion, published values and differences beside."""
     reference = problem.reference
@@ -101,8 +107,8 @@ def markdown(
             "",
             f"Candidates: distance = exp({study.intercept:.4f}) N^{study.exponent:.4f} from N = {study.parameters} on; the paper prints exp(-4.0733) N^-0.2030.",
         ]
-    if config.published.document:
-        lines += ["", f"Printed values: {config.published.document}. {config.published.note}".rstrip()]
+    if published.document:
+        lines += ["", f"Printed values: {published.document}. {published.note}".rstrip()]
     lines += [
         "",
         "Integrals are backward-difference sums on each motion's own grid, as in the documents; *spline* is the continuous "

@@ -11,7 +11,7 @@ import pandas as pd
 
 from pipeline.artifacts.record import trajectories
 from pipeline.common.files import write_beside
-from pipeline.config.studies import PublishedConfig
+from pipeline.config.documents import Printed
 from pipeline.evaluation.evaluation import Evaluation
 from pipeline.model.task import PositionTask
 from pipeline.problem.problem import Problem
@@ -22,7 +22,7 @@ def summary(
     problem: Problem,
     evaluations: Sequence[Evaluation],
     wall_times: Mapping[str, float],
-    published: PublishedConfig,
+    published: Printed,
     extras: Extras = NOTHING,
 ) -> pd.DataFrame:
     """One row per motion; `published_*` and `difference_*` (relative) columns where a document prints the number."""

@@ -11,10 +11,9 @@ A description begins with the unit in brackets, if there is one: messages, `--he
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import field
-from functools import cache, wraps
-from typing import Annotated, Any, TypeVar, dataclass_transform
+from functools import wraps
+from typing import Annotated, Any, TypeVar, cast, dataclass_transform
 
 from pydantic import (
     AfterValidator,
@@ -81,28 +80,19 @@ def schema(cls: type[T]) -> type[T]:
     plain = made.__init__
 
     @wraps(plain)
-    def __init__(self: Any, *values: Any, **named: Any) -> None:
+    def init(self: Any, *values: Any, **named: Any) -> None:
         try:
             plain(self, *values, **named)
         except ValidationError as error:
-            raise ConfigError(in_one_line(error, _schema_of(made), made.__name__)) from None
+            raise ConfigError(in_one_line(error, json_schema(made), made.__name__)) from None
 
-    made.__init__ = __init__  # type: ignore[method-assign]
-    return made
+    made.__init__ = init  # type: ignore[method-assign]
+    return cast(type[T], made)
 
 
 def build(cls: type[T], values: Any, where: str = "") -> T:
     """An instance of `cls` from a mapping; raises ConfigError that names the key and what is allowed."""
     try:
-        return _adapter(cls).validate_python(values, by_alias=True, by_name=False)
+        return TypeAdapter(cls).validate_python(values, by_alias=True, by_name=False)
     except ValidationError as error:
-        raise ConfigError(in_one_line(error, _schema_of(cls), where)) from None
-
-
-@cache
-def _adapter(cls: type[T]) -> TypeAdapter[T]:
-    return TypeAdapter(cls)
-
-
-def _schema_of(cls: type[Any]) -> Mapping[str, Any]:
-    return json_schema(_adapter(cls))
+        raise ConfigError(in_one_line(error, json_schema(cls), where)) from None

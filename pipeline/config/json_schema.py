@@ -13,9 +13,9 @@ Node = Mapping[str, Any]  # a schema, or a part of one
 BOUNDS = {"ge": "minimum", "le": "maximum"}  # pydantic's own words stay where a validator comes before the check
 
 
-def json_schema(adapter: TypeAdapter[Any]) -> dict[str, Any]:
+def json_schema(cls: type[Any]) -> dict[str, Any]:
     """Without titles and defaults of whole tables; a table that holds only some of the keys of a kind passes."""
-    found: dict[str, Any] = _trimmed(adapter.json_schema())
+    found: dict[str, Any] = _trimmed(TypeAdapter(cls).json_schema())
     return found
 
 

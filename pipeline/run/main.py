@@ -22,7 +22,7 @@ from omegaconf.errors import OmegaConfBaseException
 from pipeline.common.errors import InputError, OutputError
 from pipeline.common.files import shipped
 from pipeline.config.compose import checked
-from pipeline.config.fields import unknown_key
+from pipeline.config.messages import unknown_key
 from pipeline.run import session
 
 CONF = str(shipped("conf"))
@@ -101,7 +101,7 @@ def _in_one_line(error: Exception) -> str:
         message = f"in {' '.join(sys.argv[1:])}: {error}"
     unknown = re.search(r"Could not (?:override|append to config\.?[^']*|find) '([^']+)'", str(error))
     if unknown:
-        return str(unknown_key(unknown.group(1), _keys_beside(unknown.group(1))))
+        return unknown_key(unknown.group(1), _keys_beside(unknown.group(1)))
     return " ".join(line.strip() for line in message.splitlines() if line.strip() and not line.startswith("See http"))
 
 

@@ -8,6 +8,7 @@ from pathlib import Path as File
 
 from pipeline.common.versions import versions
 from pipeline.common.workers import Workers
+from pipeline.config.documents import printed_for
 from pipeline.config.run import RunConfig
 from pipeline.evaluation.evaluation import evaluate
 from pipeline.methods.method import Context
@@ -59,8 +60,9 @@ def run_and_write(config: RunConfig, folder: File) -> int:
     timed("extras", begin)
 
     begin = time.perf_counter()
-    summary = tables.summary(problem, evaluations, seconds, config.published, extra)
-    markdown = pages.markdown(config, problem, evaluations, summary, extra)
+    published = printed_for(config.name)
+    summary = tables.summary(problem, evaluations, seconds, published, extra)
+    markdown = pages.markdown(config, problem, evaluations, summary, extra, published)
     tables.write(folder, evaluations, summary, markdown, extra)
     if extra.exported is not None:
         arm = problem.task.arm.description
