@@ -6,8 +6,6 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-from pydantic import TypeAdapter
-
 Node = Mapping[str, Any]  # a schema, or a part of one
 
 BOUNDS = {"ge": "minimum", "le": "maximum"}  # pydantic's own words stay where a validator comes before the check
@@ -15,6 +13,8 @@ BOUNDS = {"ge": "minimum", "le": "maximum"}  # pydantic's own words stay where a
 
 def json_schema(cls: type[Any]) -> dict[str, Any]:
     """Without titles and defaults of whole tables; a table that holds only some of the keys of a kind passes."""
+    from pydantic import TypeAdapter  # only where a schema is asked for: it takes a tenth of a second to load
+
     found: dict[str, Any] = _trimmed(TypeAdapter(cls).json_schema())
     return found
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
-
-from pydantic import ValidationError
+from typing import TYPE_CHECKING, Any
 
 from pipeline.config.json_schema import Node, keys, kinds, meaning, resolved
+
+if TYPE_CHECKING:  # a key that Hydra refuses is told without loading pydantic
+    from pydantic import ValidationError
 
 UNKNOWN = ("unexpected_keyword_argument", "invalid_key")
 BOUNDS = (("minimum", ">="), ("exclusiveMinimum", ">"), ("maximum", "<="), ("exclusiveMaximum", "<"))
@@ -37,6 +38,11 @@ def unknown_key(key: str, allowed: Iterable[str]) -> str:
     """The line for a key that does not exist: the closest one, and all that may stand there."""
     hint = _hint(key.rpartition(".")[2], allowed)
     return f"{key}: unknown key; {hint}allowed: {', '.join(sorted(allowed))}"
+
+
+def unknown_option(group: str, option: str, allowed: Sequence[str]) -> str:
+    """The line for an option that a group does not have."""
+    return f"{group} = {option}: no such option; {_hint(option, allowed)}allowed: {', '.join(allowed) or 'see conf/'}"
 
 
 def _speaks_for_itself(schema: Node, node: Node) -> bool:

@@ -77,5 +77,5 @@ class TimingConfig:
     steps: Annotated[Whole, Field(ge=2, le=100_000, description="intervals of the grid of the global optimum")] = 100
     dense: Annotated[
         tuple[Annotated[Numbers, AfterValidator(_finer)], ...],
-        Field(description="[from s, to s, factor], ...: where that grid is finer than elsewhere"),
+        Field(description="rows [from s, to s, factor]: where that grid is finer than elsewhere"),
     ] = ()
