@@ -51,8 +51,8 @@ def resolved(root: Node, node: Node) -> dict[str, Any]:
 
 def kinds(root: Node, node: Node) -> dict[str, dict[str, Any]]:
     """The tables that a key `kind` chooses from: {kind: table}."""
-    mapping = node.get("discriminator", {}).get("mapping", {})
-    return {kind: resolved(root, {"$ref": target}) for kind, target in mapping.items()}
+    tables = [resolved(root, member) for member in node.get("anyOf", ())] if "discriminator" in node else []
+    return {table["properties"]["kind"]["const"]: table for table in tables}
 
 
 def keys(table: Node) -> dict[str, Node]:

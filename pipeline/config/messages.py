@@ -23,6 +23,8 @@ def in_one_line(error: ValidationError, schema: Node, where: str = "") -> str:
     if found["type"] in UNKNOWN:
         key, table = _place(schema, steps[:-1], where, within=True)
         return unknown_key(_joined(key, str(steps[-1])), list(keys(table)))
+    if found["type"] == "unexpected_positional_argument":
+        return f"{where}: {len(keys(schema))} values at most, in the order {', '.join(keys(schema))}"
     key, node = _place(schema, steps, where)
     if found["type"] == "value_error":
         return f"{key} = {_shown(value)}: {found['ctx']['error']}"
