@@ -6,15 +6,13 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-import yaml
 
 from pipeline.artifacts import summary as tables
 from pipeline.artifacts import sweep
 from pipeline.artifacts.markdown import markdown
 from pipeline.common.arrays import Array
-from pipeline.config import run as config
+from pipeline.config.documents import Printed, printed_for
 from pipeline.config.run import RunConfig
-from pipeline.config.studies import PublishedConfig
 from pipeline.evaluation.evaluation import Evaluation, evaluate
 from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Solution, Status, Trajectory
@@ -23,9 +21,7 @@ from tests.support import ROOT
 
 Make = Callable[[int, int], Problem]
 EXPERIMENTS = sorted((ROOT / "conf" / "experiment").glob("*.yaml"))
-PUBLISHED = PublishedConfig(
-    document="A paper", note="A note.", values={"lsv": {"kinetic_energy_integral": 1e-3, "singular_time": 6.5}}
-)
+PRINTED = Printed({"lsv": {"kinetic_energy_integral": 1e-3, "singular_time": 6.5}}, "A paper", "A note.")
 
 
 @pytest.fixture
@@ -46,7 +42,7 @@ def motions(asked: Problem, guess: Callable[[Problem], Array]) -> list[Evaluatio
 
 @pytest.fixture
 def summary(asked: Problem, motions: list[Evaluation]) -> pd.DataFrame:
-    return tables.summary(asked, motions, {"lsv": 0.5, "global": 2.5}, PUBLISHED)
+    return tables.summary(asked, motions, {"lsv": 0.5, "global": 2.5}, PRINTED)
 
 
 def test_summary_is_one_row_per_motion(motions: list[Evaluation], summary: pd.DataFrame) -> None:
@@ -76,8 +72,7 @@ def test_printed_values_stand_beside_the_first_optimum_of_their_method(summary: 
 @pytest.mark.parametrize("file", EXPERIMENTS, ids=lambda file: file.stem)
 def test_every_printed_number_has_a_column_to_compare_it_with(file: Path, summary: pd.DataFrame) -> None:
     """A misspelt column would silently compare nothing."""
-    printed = yaml.safe_load(file.read_text(encoding="utf-8")).get("published", {}).get("values", {})
-    for method, values in printed.items():
+    for method, values in printed_for(file.stem).values.items():
         assert set(values) <= set(summary.columns), method
 
 
@@ -102,7 +97,7 @@ def table_rows(text: str) -> list[list[str]]:
 
 
 def test_summary_for_people(asked: Problem, motions: list[Evaluation], summary: pd.DataFrame) -> None:
-    text = markdown(RunConfig(name="mine", published=PUBLISHED), asked, motions, summary, Extras())
+    text = markdown(RunConfig(name="mine"), asked, motions, summary, Extras(), PRINTED)
     rows = table_rows(text)
     assert rows[0] == ["", "lsv", "global", "global 2"]
     assert {len(row) for row in rows} == {4}
@@ -159,9 +154,9 @@ def test_a_sweep_without_any_summary_writes_nothing(tmp_path: Path) -> None:
 
 def test_a_printed_zero_or_an_unknown_column_is_no_crash(asked: Problem, motions: list[Evaluation]) -> None:
     values = {"lsv": {"torque_integral": 0.0, "nonsense": 1.0}}
-    published = config.check({"published": {"values": values}}).published
+    published = Printed(values)
     with np.errstate(divide="ignore"):
         table = tables.summary(asked, motions, {"lsv": 0.5, "global": 2.5}, published)
     assert np.isnan(table["difference_nonsense"][0])
-    text = markdown(RunConfig(published=published), asked, motions, table, Extras())
+    text = markdown(RunConfig(), asked, motions, table, Extras(), published)
     assert "printed 0" in text

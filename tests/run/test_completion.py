@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -54,7 +53,6 @@ printf '%s\\n' "${{COMPREPLY[@]}}"
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(shutil.which("bash") is None, reason="there is no bash")
 def test_a_shell_offers_the_options() -> None:
     """As it is typed; a shell that breaks words at `=` replaces what stands behind it."""
     found = completed("python -m pipeline robot=pl")

@@ -25,7 +25,7 @@ def test_every_option_of_a_group(group: str) -> None:
 def test_every_experiment() -> None:
     for name in options("experiment"):
         assert re.search(rf"\n  \+experiment={name}\s", HELP)
-    assert "a line on which" in HELP
+    assert "trajectory 4: a long line." in HELP
 
 
 def test_every_key_with_its_default() -> None:
