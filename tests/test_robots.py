@@ -10,11 +10,15 @@ from scipy.spatial.transform import Rotation
 
 from pipeline.build.problem import prepare
 from pipeline.common.files import shipped
+from pipeline.config.methods import CalculusOfVariationsOptions
 from pipeline.evaluation.evaluation import evaluate
-from pipeline.methods import calculus_of_variations, global_planner, lsv
-from pipeline.methods.pmke import predictive as pmke
+from pipeline.methods.calculus_of_variations.stationary import calculus_of_variations
+from pipeline.methods.global_planner.planner import global_planner
+from pipeline.methods.lsv import inertia_weighted, lsv
+from pipeline.methods.method import Context
+from pipeline.methods.pmke.predictive import pmke
 from pipeline.model.arm import Arm
-from pipeline.model.clearance import Obstacles
+from pipeline.model.obstacles import Obstacles
 from pipeline.model.task import PoseTask, PositionTask
 from pipeline.path.curves import Line
 from pipeline.path.orientation import Orientation
@@ -25,7 +29,8 @@ from pipeline.problem.limits import Limits
 from pipeline.problem.objective import IntegralBounds, Objective
 from pipeline.problem.problem import Boundary, Problem
 from pipeline.problem.solution import Status
-from pipeline.program.program import Transcription
+from pipeline.program.transcription import transcribe
+from pipeline.robot.mounting import Mounting
 from pipeline.search.population import population
 from pipeline.search.selection import diverse
 from tests.benchmarks.peer import PlanarArm, kinetic_energy_program, solve
@@ -37,7 +42,7 @@ from tests.support import ROBOTS, composed, robot, within_limits
 def everything(name: str, rng: np.random.Generator) -> Problem:
     """100 knots, gravity, rotor inertia, every kind of limit, an obstacle, both integrals bounded."""
     base = with_shapes(name)
-    arm = Arm(base.description, gravity=(1.0, -2.0, -9.8), armature=0.01, payload=0.3)
+    arm = Arm(base.description, Mounting(gravity=(1.0, -2.0, -9.8), armature=0.01, payload=0.3))
     task = PoseTask(arm) if arm.n > 6 else PositionTask(arm)
     q = within_limits(arm, 1, rng)[0]
     start = task.value(q[None])[0]
@@ -66,8 +71,8 @@ def everything(name: str, rng: np.random.Generator) -> Problem:
 def test_every_row_of_the_program_at_100_random_configurations(name: str, rng: np.random.Generator) -> None:
     """Along random directions, all constraints at once: their Jacobian against central differences."""
     problem = everything(name, rng)
-    made = Transcription(problem, problem.times, within_limits(problem.task.arm, 100, rng))
-    x = 0.3 * rng.normal(size=made.program.num_vars())
+    made = transcribe(problem, problem.times, within_limits(problem.task.arm, 100, rng))
+    x = 0.3 * rng.normal(size=made.drake.num_vars())
     x[: made.y.size] = 0.03 * within_limits(problem.task.arm, 100, rng).ravel()
     jacobian = program_jacobian(made, x)
     for _ in range(4):
@@ -84,7 +89,7 @@ def test_every_row_of_the_program_at_100_random_configurations(name: str, rng: n
 
 @pytest.mark.parametrize("name", ROBOTS)
 def test_dynamics_with_gravity_payload_and_rotors(name: str, rng: np.random.Generator) -> None:
-    arm = Arm(robot(name).description, gravity=(0.5, 1.0, -9.8), armature=0.02, payload=0.7)
+    arm = Arm(robot(name).description, Mounting(gravity=(0.5, 1.0, -9.8), armature=0.02, payload=0.7))
     q = within_limits(arm, 100, rng)
     qd, qdd = rng.normal(size=(2, 100, arm.n))
     tau, *gradients = arm.inverse_dynamics_gradient(q, qd, qdd)
@@ -107,8 +112,9 @@ def test_dynamics_with_gravity_payload_and_rotors(name: str, rng: np.random.Gene
 
 def test_gravity_torque_is_the_slope_of_the_potential(rng: np.random.Generator) -> None:
     """A payload on an arm adds m g' dx/dq: the difference of two arms that differ in it alone."""
-    description, g = robot("panda").description, np.array([0.3, -0.2, -9.8])
-    light, heavy = Arm(description, gravity=g), Arm(description, (0.1, 0.0, 0.2), gravity=g, payload=2.0)
+    description, g = robot("panda").description, (0.3, -0.2, -9.8)
+    light = Arm(description, Mounting(gravity=g))
+    heavy = Arm(description, Mounting((0.1, 0.0, 0.2), gravity=g, payload=2.0))
     q = within_limits(light, 10, rng)
     added = 2.0 * np.einsum("i,kij->kj", g, heavy.jacobian(q))
     np.testing.assert_allclose(heavy.gravity_torque(q) - light.gravity_torque(q), added, atol=1e-10)
@@ -117,7 +123,8 @@ def test_gravity_torque_is_the_slope_of_the_potential(rng: np.random.Generator) 
 def test_a_placed_base_moves_the_whole_arm(rng: np.random.Generator) -> None:
     for name in ("panda", "xarm7"):  # the xArm's root is called `world`
         plain = robot(name)
-        placed = Arm(plain.description, base_position=(1, 2, 3), base_rpy=(0.3, -0.4, 0.5), armature=plain.armature)
+        standing = replace(plain.mounting, base_position=(1.0, 2.0, 3.0), base_rpy=(0.3, -0.4, 0.5))
+        placed = Arm(plain.description, standing)
         q = within_limits(plain, 5, rng)
         turn = Rotation.from_euler("xyz", (0.3, -0.4, 0.5))
         shift = np.array([1.0, 2.0, 3.0])
@@ -133,7 +140,7 @@ def test_planar_4r_equals_the_peer() -> None:
     problem = prepare(
         composed("robot=planar4r", "path.length=0.5", "path.direction=150", "timing.duration=2", "timing.steps=40")
     )
-    best = global_planner.solve(problem)[0]
+    best = global_planner(problem)[0]
     ours = evaluate(problem, best)
     rng = np.random.default_rng(3)
     guesses = population(problem, problem.times, problem.q_init[None], 400, rng)
@@ -143,7 +150,7 @@ def test_planar_4r_equals_the_peer() -> None:
     path = problem.reference.position(problem.times[1:])
     costs = [solve(program, problem.q_init, path, guess[1:])[1] for guess in guesses]
     assert ours.energy_integral[-1] == pytest.approx(min(costs), rel=1e-6)
-    assert ours.energy_integral[-1] < 0.8 * evaluate(problem, lsv.solve(problem)).energy_integral[-1]
+    assert ours.energy_integral[-1] < 0.8 * evaluate(problem, lsv(problem)[0]).energy_integral[-1]
 
 
 @pytest.mark.slow
@@ -151,9 +158,9 @@ def test_the_panda_on_a_line() -> None:
     """The documents' next step, a real arm: 20 % below the pseudoinverse within every limit of its description."""
     config = composed("+experiment=panda")
     problem = prepare(config)
-    best = evaluate(problem, global_planner.solve(problem, config.method.global_, config.seed)[0])
-    plain = evaluate(problem, lsv.solve(problem))
-    weighted = evaluate(problem, lsv.solve(problem, method="inertia_weighted"))
+    best = evaluate(problem, global_planner(problem, config.method.global_, Context(config.seed))[0])
+    plain = evaluate(problem, lsv(problem)[0])
+    weighted = evaluate(problem, inertia_weighted(problem)[0])
     assert best.status is plain.status is weighted.status is Status.SOLVED
     assert best.objective < weighted.objective < plain.objective
     assert best.objective < 0.8 * plain.objective
@@ -165,8 +172,8 @@ def test_the_panda_on_a_line() -> None:
 def test_the_panda_holds_its_hand_and_keeps_off_a_ball() -> None:
     config = composed("+experiment=panda_pose_obstacle")
     problem = prepare(config)
-    best = evaluate(problem, global_planner.solve(problem, config.method.global_, config.seed)[0])
-    plain = evaluate(problem, lsv.solve(problem))
+    best = evaluate(problem, global_planner(problem, config.method.global_, Context(config.seed))[0])
+    plain = evaluate(problem, lsv(problem)[0])
     assert plain.clearance.min() < 0
     assert best.status is Status.SOLVED
     assert best.orientation_error.max() < 1e-8
@@ -180,13 +187,8 @@ def test_the_panda_holds_its_hand_and_keeps_off_a_ball() -> None:
 def test_a_pose_task_by_the_calculus_of_variations_and_by_the_planner() -> None:
     """r = 1 on seven joints, from a fixed start and without limits: two methods that share nothing but the arm."""
     problem = prepare(composed("+experiment=panda_pose", "limits=none", "timing.steps=50", "path.turn=[0,0.4,0.2]"))
-    best = evaluate(problem, global_planner.solve(problem, seed=1)[0])
-    found = calculus_of_variations.solve(
-        problem,
-        composed(
-            "method.calculus_of_variations.spacing=0.1", "method.calculus_of_variations.max_speed=0.5"
-        ).method.calculus_of_variations,
-    )
+    best = evaluate(problem, global_planner(problem)[0])
+    found = calculus_of_variations(problem, CalculusOfVariationsOptions(spacing=0.1, max_speed=0.5))
     stationary = min(float(motion.statistics["integral"]) for motion in found)
     assert best.energy_integral_spline == pytest.approx(stationary, rel=0.02)
     nearest = min(np.abs(motion.trajectory.q - best.q).max() for motion in found)
@@ -205,10 +207,10 @@ def test_pmke_and_pointing() -> None:
         )
     )
     for solution in (
-        lsv.solve(problem),
-        lsv.solve(problem, method="inertia_weighted"),
-        pmke.solve(problem),
-        global_planner.solve(problem, composed("method.global.optimised=4").method.global_)[0],
+        lsv(problem)[0],
+        inertia_weighted(problem)[0],
+        pmke(problem)[0],
+        global_planner(problem, composed("method.global.optimised=4").method.global_)[0],
     ):
         judged = evaluate(problem, solution)
         assert judged.status is Status.SOLVED, judged.message

@@ -14,7 +14,7 @@ from pipeline.config.goal import LimitsConfig, WeightedConfig
 from pipeline.config.robot import ObstaclesConfig
 from pipeline.config.run import RunConfig
 from pipeline.model.arm import Arm
-from pipeline.model.clearance import Obstacles
+from pipeline.model.obstacles import Obstacles
 from pipeline.problem.limits import Limits
 from pipeline.problem.objective import Objective
 from pipeline.problem.secondary import Secondary

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from pipeline.config.json_schema import Node, keys, kinds, meaning, resolved
+from pipeline.config.renamed import renamed
 
 if TYPE_CHECKING:  # a key that Hydra refuses is told without loading pydantic
     from pydantic import ValidationError
@@ -37,7 +38,10 @@ def in_one_line(error: ValidationError, schema: Node, where: str = "") -> str:
 
 
 def unknown_key(key: str, allowed: Iterable[str]) -> str:
-    """The line for a key that does not exist: the closest one, and all that may stand there."""
+    """The line for a key that there is not: its new name, or the closest one and all that may stand there."""
+    now = renamed(key)
+    if now is not None:
+        return f"{key}: {now}"
     hint = _hint(key.rpartition(".")[2], allowed)
     return f"{key}: unknown key; {hint}allowed: {', '.join(sorted(allowed))}"
 

@@ -22,7 +22,7 @@ from omegaconf.errors import OmegaConfBaseException
 from pipeline.common.errors import InputError, OutputError
 from pipeline.common.files import shipped
 from pipeline.run import completion, session
-from pipeline.run.refusals import in_one_line, refuse_hidden
+from pipeline.run.refusals import in_one_line, refuse
 
 CONF = str(shipped("conf"))
 
@@ -83,7 +83,7 @@ def run_job(
     # Hydra then hands its errors to us instead of printing pages and leaving with 1.
     os.environ["HYDRA_FULL_ERROR"] = "1"
     try:
-        refuse_hidden(asked)
+        refuse(asked)
         hydra.main(version_base="1.3", config_path=CONF, config_name="config")(job)()
     except InputError as error:
         return _complain(str(error))

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 from hydra import compose, initialize_config_dir
 from hydra.core.global_hydra import GlobalHydra
@@ -21,13 +22,33 @@ UNKNOWN = r"Could not (?:override|append to config\.?[^']*|find) '([^']+)'"
 GROUP = r"\+?[a-z_/]+=[\w,]+"  # a word that may pick an option
 
 
-def refuse_hidden(words: Sequence[str]) -> None:
-    """Raise ConfigError for an option that is only there to be inherited from."""
+def refuse(words: Sequence[str]) -> None:
+    """Raise ConfigError for what Hydra takes without a word: a deleted option, or one only there to be inherited from."""
     for word in words:
+        if word.startswith("~") and _deletes_an_option(word):
+            raise ConfigError(f"{word}: options cannot be deleted, only entries of tables; give it another value")
         group, _, option = word.lstrip("+").partition("=")
         hidden = [name for name in option.split(",") if name.startswith(HIDDEN)]
         if hidden and options(group):
             raise ConfigError(unknown_option(group, hidden[0], sorted(options(group))))
+
+
+def _deletes_an_option(word: str) -> bool:
+    """Whether `~key` would take the default in place of what the files say."""
+    from pipeline.config.run import RunConfig
+
+    found = re.fullmatch(r"~(\w[\w./]*)(@.*)?(=.*)?", word)
+    if found is None:
+        return False
+    first, *rest = found.group(1).replace("/", ".").split(".")
+    value: Any = RunConfig()
+    if not hasattr(value, first):
+        return False
+    for part in (first, *rest):
+        if value is None or isinstance(value, Mapping):
+            return False  # an entry of a table, such as robot.locked
+        value = getattr(value, part, value)
+    return True
 
 
 def in_one_line(error: Exception) -> str:

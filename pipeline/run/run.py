@@ -70,7 +70,7 @@ def run_and_write(config: RunConfig, folder: File) -> int:
     timed("tables", begin)
     begin = time.perf_counter()
     figures.write(folder / "figures", problem, extra.shown(evaluations), name=config.name)
-    if problem.task.arm.base_coordinates:
+    if problem.task.arm.base.count:
         base_figure.write(folder / "figures", problem, extra.shown(evaluations), name=config.name)
     if extra.closed_loop is not None:
         closed_loop_figure.write(folder / "figures", extra.closed_loop, problem, name=config.name)

@@ -16,7 +16,7 @@ from pipeline.config import compose as composing
 from pipeline.config import run as schema
 from pipeline.config.documents import printed_for
 from pipeline.config.methods import METHODS as ALL_METHODS
-from pipeline.config.methods import MethodConfig
+from pipeline.methods.registry import METHODS as REGISTRY
 from tests.support import ROOT
 
 CONF = ROOT / "conf"
@@ -105,9 +105,10 @@ def test_every_option_of_every_group(option: str) -> None:
 
 
 def test_every_method_has_its_options() -> None:
-    """The words of the key `methods`, the options and the files of the group `method` are the same."""
-    assert sorted(ALL_METHODS) == METHODS
-    assert [field.name.rstrip("_") for field in dataclasses.fields(MethodConfig)] == list(ALL_METHODS)
+    """A file, a field of the schema and an entry of the registry, which name one another's classes."""
+    assert sorted(METHODS) == sorted(ALL_METHODS) == sorted(REGISTRY)
+    for name, method in REGISTRY.items():
+        assert type(schema.RunConfig().method.of(name)) is method.options
 
 
 @pytest.mark.parametrize("experiment", EXPERIMENTS)

@@ -10,13 +10,14 @@ from scipy.interpolate import CubicSpline
 
 from pipeline.common.arrays import Array
 from pipeline.config.methods import GlobalOptions
-from pipeline.model.clearance import Clearance, Obstacles
+from pipeline.model.clearance import Clearance
+from pipeline.model.obstacles import Obstacles
 from pipeline.problem.costs import SECOND_ORDER, objective_values
 from pipeline.problem.lagrangian import Lagrangian
 from pipeline.problem.objective import Objective
 from pipeline.problem.problem import Problem
 from pipeline.program.feasibility import violations
-from pipeline.program.program import Transcription
+from pipeline.program.transcription import transcribe
 
 # What a coarse grid's optimum needs to be told apart and refined; only the last grid's is reported.
 ROUGH_TOLERANCE = 1e-4
@@ -124,7 +125,7 @@ def _optimise_lazily(
 
 
 def _optimise(problem: Problem, times: Array, guess: Array, options: GlobalOptions, keep_off: float = 0.0) -> Optimum:
-    program = Transcription(problem, times, guess, keep_off=keep_off)
+    program = transcribe(problem, times, guess, keep_off=keep_off)
     last = len(times) == len(problem.times)
     q, outcome, iterations = program.solve(
         tolerance=options.tolerance if last else max(options.tolerance, ROUGH_TOLERANCE),
