@@ -184,7 +184,7 @@ def _kept_unique(own: str, other: str, extreme: Point, options: ParetoOptions) -
 
     extreme: the other's optimum, at which both integrals set the scale.
     """
-    values = dict(zip(options.objectives, extreme.values, strict=True))
+    values: dict[str, float] = dict(zip(options.objectives, extreme.values, strict=True))
     return Objective({own: 1.0, other: LITTLE * values[own] / values[other]})
 
 

@@ -57,10 +57,11 @@ class Printed:
     document: str
     place: str
     row: documents.Row
+    found: documents.Summary
 
     @property
     def motion(self) -> Key:
-        return self.row.found.experiment, self.row.found.method, self.row.found.optimum
+        return self.found.experiment, self.found.method, self.found.optimum
 
     @property
     def value(self) -> float:
@@ -129,7 +130,7 @@ def identify(arm: Arm, config: IdentificationConfig, seed: int, workers: Workers
         def residuals(unknowns: Array, motions: dict[Any, Array] = motions) -> Array:
             moved = _follow(motions, unknowns, workers)
             motions.update({key: q for key, (q, _) in moved.items()})
-            found = [moved[entry.motion][1][entry.row.found.column] for entry in fitted]
+            found = [moved[entry.motion][1][entry.found.column] for entry in fitted]
             return (np.array(found) - target) / sigma
 
         fit = least_squares(residuals, masses, method="lm", x_scale=start, diff_step=STEP, xtol=1e-6)
@@ -191,7 +192,7 @@ def _printed(config: IdentificationConfig) -> list[Printed]:
                 continue
             if not isinstance(row.found, documents.Summary) or row.between is not None:
                 raise ConfigError(f"{name}, {place.place}, {row.quantity}: masses need a number of summary.csv")
-            found.append(Printed(name, place.place, row))
+            found.append(Printed(name, place.place, row, row.found))
     return found
 
 
@@ -263,7 +264,7 @@ def _under(
     """What these masses give for every printed number; motions that are not `known` at them are found from nothing."""
     motions = known | _solve([key for key in _wanted(printed) if key not in known], masses, seed, workers)
     found = {key: quantities(_problem(key[0], masses), q) for key, q in motions.items()}
-    return [found[entry.motion][entry.row.found.column] for entry in printed]
+    return [found[entry.motion][entry.found.column] for entry in printed]
 
 
 def _residuals(printed: Sequence[Printed], before: list[float], after: list[float]) -> pd.DataFrame:
