@@ -1,0 +1,1 @@
+def read(root, file, end_effector): raise NotImplementedError
