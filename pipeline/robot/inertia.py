@@ -13,8 +13,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from pipeline.common.arrays import Array
-from pipeline.robot.numbers import Vector
-from pipeline.robot.tree import Inertial, Joint, Link, Tree
+from pipeline.robot.tree import Inertial, Joint, Link, Tree, moments_of
 
 SLACK = 1e-6  # relative: what rounding in a file does to the moments of a thin rod or plate
 ROUNDING = 1e-14  # relative: what Drake forgives
@@ -27,6 +26,9 @@ def check(tree: Tree, group: list[str], repair: bool) -> None:
     A link of it may state what no body alone has if all of them together are possible: their sum is what the joint
     feels. repair: put the nearest possible moments in the place of impossible ones. Both are noted.
     """
+    for link in group:
+        if tree.links[link].unknown:
+            raise tree.fail(f"link '{link}': {tree.links[link].unknown}")
     wrong = {link: reason for link in group if (reason := _wrong(tree, link))}
     if repair:
         for link in wrong:
@@ -111,12 +113,6 @@ def combined(tree: Tree, group: list[str]) -> Inertial:
 def _lever(arm: Array) -> Array:
     """Moments (3, 3) [m^2] of a unit point mass at `arm`."""
     return float(arm @ arm) * np.eye(3) - np.outer(arm, arm)
-
-
-def moments_of(matrix: Array) -> Vector:
-    """(ixx, iyy, izz, ixy, ixz, iyz) of a matrix (3, 3)."""
-    places = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
-    return tuple(float(matrix[place]) for place in places)
 
 
 def check_carried(tree: Tree, chain: list[Joint], moving: list[Joint]) -> None:

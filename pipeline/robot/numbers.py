@@ -14,7 +14,7 @@ from pipeline.common.errors import RobotError
 Vector = tuple[float, ...]
 
 SPACE = " \t\r\n"  # XML's own: no other white space separates numbers
-WORDS = ("no numbers", "a number", "two numbers", "three numbers", "four numbers", "", "six numbers", "seven numbers")
+WORDS = ("none", "a number", *(f"{word} numbers" for word in ("two", "three", "four", "five", "six", "seven")))
 
 _DECIMAL = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?", re.ASCII)
 _INFINITE = re.compile(r"[+-]?inf(inity)?", re.ASCII | re.IGNORECASE)

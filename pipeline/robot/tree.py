@@ -34,13 +34,20 @@ class Inertial:
         return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
+def moments_of(matrix: Array) -> Vector:
+    """(ixx, iyy, izz, ixy, ixz, iyz) of a matrix (3, 3)."""
+    places = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+    return tuple(float(matrix[place]) for place in places)
+
+
 @dataclass
 class Link:
-    """One link. solid: whether the file gives it any shape to see or to touch."""
+    """One link. solid: whether the file gives it any shape to see or to touch. unknown: why its inertia is not known."""
 
     name: str
     inertial: Inertial | None = None
     solid: bool = False
+    unknown: str = ""
 
     @property
     def mass(self) -> float:
@@ -60,7 +67,8 @@ class Mimic:
 class Joint:
     """One joint: its frame in the parent link (xyz [m], rpy [rad]), which is the child link's frame; its axis in it.
 
-    limit: what the file states, as text, of lower, upper, velocity and effort: read where it is used.
+    limit: what the file states, as text, of lower, upper, velocity and effort: read where it is used. armature: rotor
+    inertia that the file states [kg m^2].
     """
 
     name: str
@@ -72,6 +80,7 @@ class Joint:
     axis: Vector = (1.0, 0.0, 0.0)
     limit: Mapping[str, str] = field(default_factory=dict)
     mimic: Mimic | None = None
+    armature: float = 0.0
 
 
 @dataclass

@@ -66,11 +66,14 @@ def read(
     for joint in moving:
         _axis(tree, joint)
     names = {joint.name for joint in moving}
-    inertia.check_carried(tree, chain, moving)
     for joint in moving:
         inertia.check(tree, tree.group(joint.child, names), repair_inertia)
+    inertia.check_carried(tree, chain, moving)
     with suppress(RobotError):  # the root's counts where it floats only: see check_root
         inertia.check(tree, tree.group(root, names), repair_inertia)
+    if any(joint.armature for joint in moving):
+        rotors = ",".join(f"{joint.armature:g}" for joint in moving)
+        tree.notes.append(f"the file's rotor inertia is not used; robot.armature=[{rotors}] takes it")
     velocity, effort = (limits.bounds(tree, moving, key, unlimited) for key in ("velocity", "effort"))
     return Description(
         name=tree.name,
