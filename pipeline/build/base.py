@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import replace
+
+import numpy as np
+
+from pipeline.build.regular import require_regular
 from pipeline.common.arrays import Array
 from pipeline.common.errors import ConfigError
 from pipeline.config.robot import FreeBaseConfig
 from pipeline.config.run import RunConfig
 from pipeline.model.arm import Arm
-from pipeline.model.base import FloatingArm
-from pipeline.model.base import is_planar
+from pipeline.model.base import FloatingArm, is_planar
 from pipeline.problem.limits import Limits
 from pipeline.problem.problem import Problem
 from pipeline.robot.spacecraft import Spacecraft
-from pipeline.robot.urdf import root_mass
-import numpy as np
+from pipeline.robot.urdf import check_root, root_mass
 
 REACTIONS = {"reaction_force", "reaction_torque"}
 
@@ -50,6 +52,7 @@ def _moved(problem: Problem, spacecraft: Spacecraft) -> Problem:
     if planar and any(spacecraft.momentum[i] for i in (2, 3, 4)):
         raise ConfigError("base: a planar arm has linear momentum in x and y, and angular momentum about z only")
     arm = FloatingArm(fixed, spacecraft, planar)
+    require_regular(arm)
     free = np.full(arm.base_coordinates, np.inf)
 
     def padded(values: Array, sign: float = 1.0) -> Array:
@@ -69,6 +72,7 @@ def _moved(problem: Problem, spacecraft: Spacecraft) -> Problem:
 
 
 def _spacecraft(base: FreeBaseConfig, arm: Arm) -> Spacecraft:
+    check_root(arm.description)
     momentum = (*base.linear_momentum, *base.angular_momentum)
     if base.mass is None:
         if root_mass(arm.description) <= 0:

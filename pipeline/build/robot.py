@@ -2,30 +2,36 @@
 
 from __future__ import annotations
 
+import difflib
 from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from pipeline.build.regular import require_regular
 from pipeline.common.arrays import Array
-from pipeline.common.errors import ConfigError
-from pipeline.common.errors import RobotError
-from pipeline.config.robot import CapsuleConfig
-from pipeline.config.robot import RobotConfig
-from pipeline.config.robot import SphereConfig
+from pipeline.common.errors import ConfigError, RobotError
+from pipeline.config.robot import CapsuleConfig, RobotConfig, SphereConfig
 from pipeline.model.arm import Arm
 from pipeline.robot import urdf
 from pipeline.robot.description import Description
 from pipeline.robot.packages import find
-from pipeline.robot.shapes import Shape
-from pipeline.robot.shapes import capsule
-from scipy.spatial.transform import Rotation
-from typing import Any
-import difflib
-import numpy as np
+from pipeline.robot.shapes import Shape, capsule
 
 GRAVITY = {"none": (0.0, 0.0, 0.0), "earth": (0.0, 0.0, -9.80665)}  # [m/s^2]
 
 
 def load(robot: RobotConfig, gravity: str | list[float] = "none") -> Arm:
     """The arm of a configuration; raises RobotError or ConfigError, one line."""
-    description = urdf.read(find(robot.urdf), robot.end_effector, robot.base, robot.locked)
+    description = urdf.read(
+        find(robot.urdf),
+        robot.end_effector,
+        robot.base,
+        robot.locked,
+        repair_inertia=robot.repair_inertia,
+        unlimited=robot.unlimited,
+    )
     if robot.collision is not None:
         shapes = _link_shapes(robot.collision, description)
         description = replace(description, collision=shapes)
@@ -33,7 +39,7 @@ def load(robot: RobotConfig, gravity: str | list[float] = "none") -> Arm:
         raise ConfigError(
             f"robot.armature has {len(robot.armature)} values, the arm has {len(description.joints)} moving joints"
         )
-    return Arm(
+    arm = Arm(
         description,
         robot.offset,
         offset_rpy=robot.offset_rpy,
@@ -43,6 +49,8 @@ def load(robot: RobotConfig, gravity: str | list[float] = "none") -> Arm:
         payload=robot.payload,
         armature=robot.armature,
     )
+    require_regular(arm)
+    return arm
 
 
 def initial(robot: RobotConfig, arm: Arm) -> Array:

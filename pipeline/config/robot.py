@@ -13,8 +13,10 @@ from pipeline.config.fields import (
     number,
     numbers,
     per_joint,
+    switch,
     table_of,
     text,
+    texts,
 )
 
 
@@ -70,6 +72,8 @@ class RobotConfig:
     collision: dict[str, list[SphereConfig | BoxConfig | CapsuleConfig]] | None = table_of(SHAPES, listed=True)
     q_init: list[float] | None = numbers([0.0, 0.327, -0.754], unit="rad", optional=True)
     locked: dict[str, float] | None = mapping(any_number, optional=True)
+    repair_inertia: bool = switch(False)
+    unlimited: list[str] = texts()
 
 
 @dataclass(frozen=True)

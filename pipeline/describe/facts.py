@@ -40,7 +40,7 @@ def inspect(robot: RobotConfig, gravity: str | list[float] = "none") -> Facts:
     arm = load(robot, gravity)
     description = arm.description
     q_init = initial(robot, arm)
-    notes = []
+    notes = list(description.notes)
     unlimited = [n for n, v in zip(description.joints, description.velocity, strict=True) if not np.isfinite(v)]
     weak = [n for n, v in zip(description.joints, description.effort, strict=True) if not np.isfinite(v)]
     for names, what in ((unlimited, "velocity"), (weak, "effort")):

@@ -38,14 +38,15 @@ def bounds(tree: Tree, joints: list[Joint], key: str, unlimited: Collection[str]
         empty = values <= 0.0
         if empty.any():
             names = ", ".join(joint.name for joint, none in zip(joints, empty, strict=True) if none)
-            tree.notes.append(f"robot.unlimited: the {key} limits of {names} are not above 0 in the file, taken as none")
+            tree.notes.append(
+                f"robot.unlimited: the {key} limits of {names} are not above 0 in the file, taken as none"
+            )
         values[empty] = np.inf
     return values
 
 
-def usable(description: Description, key: str) -> Array:
-    """The velocity or effort limits (n,) of a description; raises RobotError where nothing could move within them."""
-    values: Array = getattr(description, key)
+def require_room(description: Description, key: str, values: Array) -> None:
+    """Refuse velocity or effort limits (n,) within which nothing could move: no override is like that, so the file's are."""
     stuck = np.flatnonzero(values <= 0.0)
     if stuck.size:
         names = ", ".join(description.joints[i] for i in stuck)
@@ -54,7 +55,6 @@ def usable(description: Description, key: str) -> Array:
             f"robot.urdf = {description.file}: the {key} limit of {names} is {stated}, so nothing could move; give "
             f"{OVERRIDE[key]} (one number, or one per joint), or robot.unlimited=[{key}] to take it as none stated"
         )
-    return values
 
 
 def require_held_within(description: Description) -> None:

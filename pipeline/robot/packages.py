@@ -27,7 +27,8 @@ KNOWN = {"example-robot-data": "pip install 'selfmotion[robots]'"}
 
 def resolve(uri: str, beside: Path | None = None) -> Path | None:
     """The file of a `package://`, `model://`, `file://` or plain name, which may be relative to the folder `beside`; None
-    if unknown."""
+    if unknown.
+    """
     if uri.startswith("file:"):
         return Path(unquote(urlsplit(uri).path))
     if not uri.startswith(SCHEMES):
@@ -71,7 +72,8 @@ def model_file(uri: str, beside: Path | None = None) -> Path | None:
 def named_folder(uri: str, beside: Path | None = None) -> dict[str, str]:
     """The package that a name begins with, and its folder; empty if it names none, or one that is not known."""
     name = _parts(uri)[0] if uri.startswith(SCHEMES) else ""
-    return {name: str(folder) for folder in _folders(name, beside) if folder.is_dir()} if name else {}
+    folder = next((folder for folder in _folders(name, beside) if folder.is_dir()), None) if name else None
+    return {} if folder is None else {name: str(folder)}
 
 
 def _parts(uri: str) -> tuple[str, str]:
@@ -112,7 +114,8 @@ def _listed(*variables: str) -> list[str]:
 
 def find(name: str) -> Path:
     """A robot description by package://, model:// or file:// name, absolute path, or path relative to the working directory
-    or the project."""
+    or the project.
+    """
     if name.startswith(SCHEMES):
         return model_file(name) or locate(name, "robot.urdf")
     given = Path(unquote(urlsplit(name).path)) if name.startswith("file:") else Path(name).expanduser()

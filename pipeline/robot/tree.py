@@ -20,7 +20,8 @@ MOMENTS = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 @dataclass(frozen=True)
 class Inertial:
     """Mass [kg]; centre of mass and roll, pitch, yaw of the axes of the moments, in the link [m, rad]; and the moments
-    (ixx, iyy, izz, ixy, ixz, iyz) [kg m^2] about that centre."""
+    (ixx, iyy, izz, ixy, ixz, iyz) [kg m^2] about that centre.
+    """
 
     mass: float
     com: Vector = ZERO

@@ -16,13 +16,13 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from pipeline.common.errors import RobotError
 from pipeline.robot import formats, inertia, limits
 from pipeline.robot.description import Description, Held
 from pipeline.robot.formats.urdf import read as from_element
 from pipeline.robot.numbers import written
 from pipeline.robot.planar import split_planar
 from pipeline.robot.tree import MOMENTS, ZERO, Joint, Tree
-from pipeline.common.errors import RobotError
 
 MOVING = ("revolute", "continuous", "prismatic")
 
@@ -55,7 +55,9 @@ def read(
     chain = _chain(base, end_effector, carrier, file)
     positions = _held(tree, chain, locked)
     held = tuple(
-        Held(name, value, limits.bound(tree, tree.joints[name], "lower"), limits.bound(tree, tree.joints[name], "upper"))
+        Held(
+            name, value, limits.bound(tree, tree.joints[name], "lower"), limits.bound(tree, tree.joints[name], "upper")
+        )
         for name, value in locked.items()
     )
     for name, position in positions.items():
@@ -122,7 +124,8 @@ def _chain(base: str, tip: str, carrier: Mapping[str, Joint], file: Path) -> lis
 
 def _held(tree: Tree, chain: list[Joint], locked: Mapping[str, float]) -> dict[str, float]:
     """The position of every joint that does not move: what is locked, what mimics something that does not move, the rest
-    at zero. Raises RobotError for what can neither move nor stand."""
+    at zero. Raises RobotError for what can neither move nor stand.
+    """
     on_chain = {joint.name for joint in chain}
 
     def position(name: str, asked: tuple[str, ...] = ()) -> float | None:
@@ -147,7 +150,9 @@ def _held(tree: Tree, chain: list[Joint], locked: Mapping[str, float]) -> dict[s
     for joint in chain:
         if joint.name in positions:
             if joint.name not in locked and joint.kind != "fixed":
-                tree.notes.append(f"joint {joint.name} stands at {positions[joint.name]:g}, as what it mimics does not move")
+                tree.notes.append(
+                    f"joint {joint.name} stands at {positions[joint.name]:g}, as what it mimics does not move"
+                )
         elif joint.kind not in MOVING:
             raise tree.fail(
                 f"joint '{joint.name}' in the chain is of type '{joint.kind}'; allowed: {', '.join(MOVING)}, planar, fixed; "
@@ -186,7 +191,9 @@ def _freeze(tree: Tree, joint: Joint, position: float) -> None:
             turned = rotation * Rotation.from_rotvec(axis * position)
             joint.rpy = tuple(turned.as_euler("xyz", suppress_warnings=True).tolist())
     elif position != 0.0 and joint.kind != "fixed":
-        raise RobotError(f"robot.locked.{joint.name} = {position:g}: a joint of type '{joint.kind}' can be held at 0 only")
+        raise RobotError(
+            f"robot.locked.{joint.name} = {position:g}: a joint of type '{joint.kind}' can be held at 0 only"
+        )
     joint.kind = "fixed"
 
 
@@ -221,6 +228,13 @@ def link_masses(description: Description) -> dict[str, float]:
     """The mass [kg] that each moving joint carries rigidly, up to the next moving joints."""
     tree, names = _again(description)
     return {name: _mass(tree, tree.group(tree.joints[name].child, names)) for name in description.joints}
+
+
+def carried_by(description: Description, joint: str) -> str:
+    """The first link that a moving joint carries and that has a mass."""
+    tree, names = _again(description)
+    group = tree.group(tree.joints[joint].child, names)
+    return next((link for link in group if tree.links[link].mass > 0.0), group[0])
 
 
 def root_mass(description: Description) -> float:

@@ -14,11 +14,11 @@ from pydrake.multibody.plant import MultibodyPlant
 
 from pipeline.robot.formats import plant as drake
 from pipeline.robot.markup import parse
-from pipeline.robot.numbers import number, numbers
+from pipeline.robot.numbers import Vector, number, numbers
 from pipeline.robot.tree import Inertial, Link, Mimic, Tree, moments_of
 
 TURNS = ("quat", "euler", "axisangle", "xyaxes", "zaxis")
-COUNTS = {
+COUNTS: dict[str, int | tuple[int, ...]] = {
     **{"pos": 3, "quat": 4, "euler": 3, "axisangle": 4, "xyaxes": 6, "zaxis": 3, "axis": 3, "range": 2, "ref": 1},
     **{"mass": 1, "density": 1, "diaginertia": 3, "fullinertia": 6, "fromto": 6, "armature": 1, "size": (1, 2, 3)},
     **{"gear": (1, 2, 3, 4, 5, 6), "forcerange": 2, "ctrlrange": 2, "actuatorfrcrange": 2},
@@ -139,7 +139,11 @@ def _stated(element: ET.Element, outer: str, classes: Classes, tree: Tree) -> di
     tag = "general" if element.tag in ACTUATORS else element.tag
     stated = _over(classes[name].get(tag, {}), element)
     for key in COUNTS.keys() & stated.keys():
-        numbers(stated[key], COUNTS[key], f"robot.urdf = {tree.file}: {element.tag} '{stated.get('name', '')}' has the {key}")
+        numbers(
+            stated[key],
+            COUNTS[key],
+            f"robot.urdf = {tree.file}: {element.tag} '{stated.get('name', '')}' has the {key}",
+        )
     return stated
 
 
@@ -198,7 +202,7 @@ def _weighs(geom: ET.Element) -> bool:
 
 
 def _inertial(inertial: ET.Element, where: str) -> Inertial:
-    moments = (0.0,) * 6
+    moments: Vector = (0.0,) * 6
     if "fullinertia" in inertial.attrib:
         moments = numbers(inertial.attrib["fullinertia"], 6, f"{where} the fullinertia")
     elif "diaginertia" in inertial.attrib:

@@ -54,7 +54,8 @@ def _quiet() -> Iterator[None]:
 
 def fill(tree: Tree, plant: Any, models: list[Any], name: Callable[[Any], str], links: Mapping[str, Link]) -> None:
     """Put the bodies and joints of some models into `tree`. name: what a body or joint is called there; links: what
-    the file says of a link."""
+    the file says of a link.
+    """
     bodies = [plant.get_body(index) for model in models for index in plant.GetBodyIndices(model)]
     for body in bodies:
         tree.add_link(links.get(name(body), Link(name(body))))

@@ -176,9 +176,11 @@ def _complete(tree: Tree, name: str, element: ET.Element) -> None:
     written = {key: axis.findtext(f"limit/{key}") for key in ("lower", "upper", "velocity", "effort")}
     joint.limit = {key: text for key, text in written.items() if text is not None}
     for key in ("velocity", "effort"):  # SDF has negative ones for none
-        if written[key] is not None and number(
-            joint.limit[key], f"robot.urdf = {tree.file}: joint '{name}' has the {key} limit", infinite=True
-        ) < 0.0:
+        if (
+            written[key] is not None
+            and number(joint.limit[key], f"robot.urdf = {tree.file}: joint '{name}' has the {key} limit", infinite=True)
+            < 0.0
+        ):
             joint.limit = {k: text for k, text in joint.limit.items() if k != key}
     mimic = axis.find("mimic")
     if mimic is not None:

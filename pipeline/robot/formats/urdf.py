@@ -31,7 +31,9 @@ def _refuse_xacro(root: ET.Element, file: Path) -> None:
     """A file for xacro is a program that writes a URDF."""
     for element in root.iter():
         template = next((value for value in element.attrib.values() if "${" in value or "$(" in value), None)
-        if element.tag.startswith("xacro:") or (template and element.tag in ("link", "joint", "origin", "mass", "limit")):
+        if element.tag.startswith("xacro:") or (
+            template and element.tag in ("link", "joint", "origin", "mass", "limit")
+        ):
             what = f"<{element.tag}>" if template is None else f"'{shown(template)}' in a <{element.tag}>"
             raise RobotError(
                 f"robot.urdf = {file}: a xacro file, not expanded ({what}); expand it first: "
@@ -44,7 +46,7 @@ def _inertial(link: ET.Element, where: str) -> Inertial | None:
     if inertial is None:
         return None
     mass, inertia = inertial.find("mass"), inertial.find("inertia")
-    moments = (0.0,) * 6  # a point mass
+    moments: Vector = (0.0,) * 6  # a point mass
     if inertia is not None:
         written = {key: inertia.get(key, "" if key in ("ixx", "iyy", "izz") else "0") for key in MOMENTS}
         moments = tuple(number(text, f"{where} the inertia {key}") for key, text in written.items())
