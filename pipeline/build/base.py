@@ -52,7 +52,8 @@ def _moved(problem: Problem, spacecraft: Spacecraft) -> Problem:
     if planar and any(spacecraft.momentum[i] for i in (2, 3, 4)):
         raise ConfigError("base: a planar arm has linear momentum in x and y, and angular momentum about z only")
     arm = FloatingArm(fixed, spacecraft, planar)
-    require_regular(arm)
+    if not spacecraft.held:
+        require_regular(arm)
     free = np.full(arm.base_coordinates, np.inf)
 
     def padded(values: Array, sign: float = 1.0) -> Array:

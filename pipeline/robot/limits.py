@@ -28,7 +28,7 @@ def bound(tree: Tree, joint: Joint, key: str) -> float:
     if key in ("lower", "upper") and np.sign(value) != np.sign(ABSENT[key]):
         side = "above" if key == "lower" else "below"
         raise tree.fail(f"joint '{joint.name}' has the {key} limit '{shown(text)}': no position is {side} it")
-    return ABSENT[key] if value > 0 or key == "lower" else value
+    return ABSENT[key]  # of a negative velocity or effort too: files bound it by -1e16 and 1e16
 
 
 def bounds(tree: Tree, joints: list[Joint], key: str, unlimited: Collection[str] = ()) -> Array:

@@ -27,9 +27,9 @@ def picture(description: Description) -> tuple[str, list[str]]:
     if root.tag != "robot":
         return "", [f"the pictures of a file with <{root.tag}> are not drawn"]
     _drop_foreign(root)
-    if all(link.get("name") != "world" for link in root.findall("link")):
-        if any(parent.get("link") == "world" for parent in root.iterfind("joint/parent")):
-            root.insert(0, ET.Element("link", name="world"))
+    parents = {parent.get("link") for parent in root.iterfind("joint/parent")}
+    if "world" in parents - {link.get("name") for link in root.findall("link")}:
+        root.insert(0, ET.Element("link", name="world"))
     missing: list[str] = []
     large = _resolve(root, "visual", description.file.parent, missing) > LARGE
     if large:
