@@ -26,7 +26,7 @@ def require_regular(arm: Arm) -> None:
             return
         still = np.abs(vectors[-1, :, 0])
         involved = np.flatnonzero(still > 1e-3 * still.max())
-    if involved[0] < arm.base_coordinates:
+    if involved[0] < arm.base.count:
         raise ConfigError(
             "base.inertia = 0, and the root link has none: turning the base moves no mass, so that the mass matrix is "
             "singular; give base.inertia"

@@ -16,6 +16,7 @@ from pipeline.config.robot import CapsuleConfig, RobotConfig, SphereConfig
 from pipeline.model.arm import Arm
 from pipeline.robot import urdf
 from pipeline.robot.description import Description
+from pipeline.robot.mounting import Mounting
 from pipeline.robot.packages import find
 from pipeline.robot.shapes import Shape, capsule
 
@@ -39,16 +40,17 @@ def load(robot: RobotConfig, gravity: str | list[float] = "none") -> Arm:
         raise ConfigError(
             f"robot.armature has {len(robot.armature)} values, the arm has {len(description.joints)} moving joints"
         )
-    arm = Arm(
-        description,
-        robot.offset,
-        offset_rpy=robot.offset_rpy,
-        base_position=robot.base_position,
-        base_rpy=robot.base_rpy,
-        gravity=GRAVITY[gravity] if isinstance(gravity, str) else gravity,
+    armature = robot.armature
+    mounting = Mounting(
+        offset=tuple(robot.offset),
+        offset_rpy=tuple(robot.offset_rpy),
+        base_position=tuple(robot.base_position),
+        base_rpy=tuple(robot.base_rpy),
+        gravity=GRAVITY[gravity] if isinstance(gravity, str) else tuple(gravity),
         payload=robot.payload,
-        armature=robot.armature,
+        armature=tuple(armature) if isinstance(armature, list) else armature,
     )
+    arm = Arm(description, mounting)
     require_regular(arm)
     return arm
 

@@ -16,16 +16,18 @@ from scipy.interpolate import CubicSpline
 from pipeline.common.arrays import Array
 from pipeline.common.workers import Workers
 from pipeline.config.methods import GlobalOptions
-from pipeline.model.clearance import Clearance, Obstacles
+from pipeline.model.clearance import Clearance
 from pipeline.model.kinematics import wrap
-from pipeline.problem.costs import SECOND_ORDER, objective_values
+from pipeline.model.obstacles import Obstacles
+from pipeline.problem.costs import objective_values
+from pipeline.problem.integrals import of_order
 from pipeline.problem.lagrangian import Lagrangian
 from pipeline.problem.limits import LIMIT_KINDS
 from pipeline.problem.objective import Objective
 from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Progress, Solution, Status, Trajectory, no_progress
 from pipeline.program.feasibility import Relaxed, least_violation, violations
-from pipeline.program.program import Transcription
+from pipeline.program.transcription import transcribe
 from pipeline.search.configurations import starting_points
 from pipeline.search.population import population, ranking
 from pipeline.search.selection import distinct, diverse
@@ -192,7 +194,7 @@ def _optimise_start(context: tuple[Problem, Array, GlobalOptions], guess: Array)
     first: Optimum | None = None
     if problem.objective.second_order or _limits_torque(problem):
         first_order = Lagrangian(problem.task, problem.objective).is_quadratic
-        only = replace(problem.objective, torque=0.0, reaction_force=0.0, reaction_torque=0.0)
+        only = replace(problem.objective, weights=of_order(problem.objective.weights, 1))
         objective = only if first_order else Objective()
         first = _optimise(replace(_without_torque_limits(problem), objective=objective), times, guess, options)
         solves += first.solves
@@ -241,7 +243,7 @@ def _optimise_lazily(
     """As `_optimise`; but where torque limits alone bring torques in and the guess keeps them, it is tried without."""
     if (
         problem.objective.second_order
-        or problem.integral_bounds.bounds(*SECOND_ORDER)
+        or of_order(problem.bounds_of_integrals, 2)
         or not _limits_torque(problem)
         or not _keeps_torque_limits(problem, times, guess)
     ):
@@ -254,7 +256,7 @@ def _optimise_lazily(
 
 
 def _optimise(problem: Problem, times: Array, guess: Array, options: GlobalOptions, keep_off: float = 0.0) -> Optimum:
-    program = Transcription(problem, times, guess, keep_off=keep_off)
+    program = transcribe(problem, times, guess, keep_off=keep_off)
     last = len(times) == len(problem.times)
     q, outcome, iterations = program.solve(
         tolerance=options.tolerance if last else max(options.tolerance, ROUGH_TOLERANCE),

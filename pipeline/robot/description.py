@@ -33,7 +33,7 @@ class Description:
     A limit that the file does not state is infinite. collision: primitive shapes of links. meshes: links that have
     collision meshes instead, which are not used. pictures: file names of visual meshes. held: the joints that are locked.
     notes: what was read otherwise than it stands in the file, one line each.
-    base_coordinates: how many of the joints, the first ones, are not the arm's but move its base (`floating.py`), and
+    base_coordinates: how many of the joints, the first ones, are not the arm's but move its base (`spacecraft.py`), and
     root: the link of the xml that they start from.
     """
 

@@ -13,6 +13,7 @@ from pipeline.common.errors import RobotError
 from pipeline.model.arm import Arm
 from pipeline.robot import urdf
 from pipeline.robot.description import Description
+from pipeline.robot.mounting import Mounting
 
 FOLDER = Path(__file__).parent / "descriptions"
 INF = np.inf
@@ -61,8 +62,8 @@ def test_a_finger_stands_where_what_it_mimics_does() -> None:
     np.testing.assert_allclose(Arm(got).position(np.zeros((1, 2)))[0], (0.7, -0.01, 0.0), atol=1e-15)
     held = read("gripper.urdf", "right_finger", locked={"left_slide": 0.04})
     np.testing.assert_allclose(Arm(held).position(np.zeros((1, 2)))[0], (0.7, -0.03, 0.0), atol=1e-15)
+    text = (FOLDER / "gripper.urdf").read_text()
     with pytest.raises(RobotError, match=r"joint 'right_slide' in the chain mimics another joint; lock it"):
-        text = (FOLDER / "gripper.urdf").read_text()
         _read_text(text.replace('mimic joint="left_slide"', 'mimic joint="elbow"'), "right_finger")
 
 
@@ -94,8 +95,8 @@ def test_a_mass_on_the_last_axis() -> None:
     got = read("point_wrist.urdf", "hand")
     with pytest.raises(RobotError, match=r"link hand: moving joint roll moves no mass, .* or robot\.armature$"):
         require_regular(Arm(got))
-    require_regular(Arm(got, armature=1e-3))
-    require_regular(Arm(got, (0.0, 0.1, 0.0), payload=0.1))  # off the axis
+    require_regular(Arm(got, Mounting(armature=1e-3)))
+    require_regular(Arm(got, Mounting(offset=(0.0, 0.1, 0.0), payload=0.1)))  # off the axis
 
 
 def test_inertias_of_a_drawing_program() -> None:

@@ -57,7 +57,7 @@ def test_several_numbers() -> None:
     assert numbers("1 2\t3", 3, "here") == (1.0, 2.0, 3.0)
     assert numbers("1 2", (1, 2), "here") == (1.0, 2.0)
     for text in ("", "1 2", "1 2 3 4", "1 2\u30003", "1,2,3"):
-        with pytest.raises(RobotError, match="^here '"):
+        with pytest.raises(RobotError, match=r"^here '"):
             numbers(text, 3, "here")
     with pytest.raises(RobotError, match=r"expected a number or three numbers$"):
         numbers("1 2", (1, 3), "here")
