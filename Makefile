@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help run reproduce test fast lint bench clean pictures
+.PHONY: help run reproduce test fast lint format cover bench package docs pictures clean
 
 help: ## this list
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
@@ -16,21 +16,35 @@ reproduce: $(VENV)/.installed ## every printed number and figure of the three do
 	$(BIN)/python -m pipeline.reproduce
 
 test: $(VENV)/.installed-dev ## set up, then run the whole test suite
-	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile
+	$(BIN)/python -m pytest --numprocesses 2 --dist worksteal
 
 fast: $(VENV)/.installed-dev ## the tests that take less than a few seconds each
-	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile -m "not slow"
+	$(BIN)/python -m pytest --numprocesses 2 --dist worksteal -m "not slow"
 
-lint: $(VENV)/.installed-dev ## lint, format check and type check
+lint: $(VENV)/.installed-dev ## lint, format, types, and which package may import which
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+	$(BIN)/lint-imports --no-logo
+
+format: $(VENV)/.installed-dev ## put the code into its form, and mend what the linter can mend by itself
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+cover: $(VENV)/.installed-dev ## which lines the tests do not reach
+	$(BIN)/python -m pytest --numprocesses 2 --dist worksteal --cov pipeline --cov-report term-missing:skip-covered
 
 bench: $(VENV)/.installed-dev ## time the solver side by side with CasADi (never part of the tests)
 	$(BIN)/python -m tests.benchmarks
 
+package: $(VENV)/.installed-dev ## sdist and wheel, tried in an environment of their own from another folder
+	sh tests/package.sh $(BIN)/python
+
+docs: $(VENV)/.installed-dev ## the reference of the public names as a static site, outputs/docs/index.html
+	$(BIN)/pdoc --output-directory outputs/docs --docformat google pipeline
+
 clean: ## remove the environment and all caches, keep outputs/
-	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache .hypothesis *.egg-info build
+	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache .coverage build dist
 
 $(VENV)/bin/python:
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or newer is needed, this is " + sys.version.split()[0])'

@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from pipeline.build.problem import prepare
-from pipeline.common.files import PROJECT
+from pipeline.common.files import shipped
 from pipeline.evaluation.evaluation import evaluate
 from pipeline.methods import calculus_of_variations, global_planner, lsv
 from pipeline.methods.pmke import predictive as pmke
@@ -138,7 +138,7 @@ def test_planar_4r_equals_the_peer() -> None:
     rng = np.random.default_rng(3)
     guesses = population(problem, problem.times, problem.q_init[None], 400, rng)
     guesses = guesses[diverse(guesses, objective_values(problem, problem.times, guesses), 24, 0.1, np.ones(4, bool))]
-    peer = PlanarArm.from_urdf(PROJECT / "robots" / "planar4r.urdf")
+    peer = PlanarArm.from_urdf(shipped("robots/planar4r.urdf"))
     program = kinetic_energy_program(peer, 40, 0.05)
     path = problem.reference.position(problem.times[1:])
     costs = [solve(program, problem.q_init, path, guess[1:])[1] for guess in guesses]

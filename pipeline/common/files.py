@@ -19,4 +19,8 @@ def write_beside(file: Path, write: Callable[[Path], Any]) -> None:
         unfinished.unlink(missing_ok=True)
 
 
-PROJECT = Path(__file__).resolve().parents[2]
+def shipped(name: str) -> Path:
+    """What travels with the package, such as `conf` or `robots/planar3r.urdf`: within it, or beside it in a checkout."""
+    package = Path(__file__).resolve().parents[1]
+    inside = package / name
+    return inside if inside.exists() else package.parent / name

@@ -8,7 +8,7 @@ from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
 from pipeline.common.errors import ConfigError
-from pipeline.common.files import PROJECT
+from pipeline.common.files import shipped
 from pipeline.config.run import RunConfig, check
 
 
@@ -19,7 +19,7 @@ def experiment(name: str, *overrides: str) -> RunConfig:
     words = [f"+experiment={name}", *overrides]
     if GlobalHydra.instance().is_initialized():
         return checked(compose("config", overrides=words))
-    with initialize_config_dir(str(PROJECT / "conf"), version_base="1.3"):
+    with initialize_config_dir(str(shipped("conf")), version_base="1.3"):
         return checked(compose("config", overrides=words))
 
 

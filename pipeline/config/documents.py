@@ -14,10 +14,10 @@ from typing import Any
 import yaml
 
 from pipeline.common.errors import ConfigError
-from pipeline.common.files import PROJECT
+from pipeline.common.files import shipped
 from pipeline.config.fields import build, choice, count, fixed, list_of, mapping, number, numbers, one_of, text, texts
 
-FOLDER = PROJECT / "conf" / "reproduction"
+FOLDER = shipped("conf") / "reproduction"
 
 
 DOCUMENTS = ("pmke", "global", "pontryagin")

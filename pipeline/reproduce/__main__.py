@@ -18,14 +18,14 @@ from hydra.core.hydra_config import HydraConfig
 from omegaconf import DictConfig
 
 from pipeline.common.errors import ConfigError, InputError
-from pipeline.common.files import PROJECT, write_beside
+from pipeline.common.files import write_beside
 from pipeline.config import documents
 from pipeline.reproduce import pages, tables
 from pipeline.reproduce.results import Results
 from pipeline.reproduce.table import compare
 from pipeline.run import main as command_line
 
-FOLDER = PROJECT / "outputs" / "reproduction"
+FOLDER = Path("outputs") / "reproduction"
 
 
 def main(words: Sequence[str]) -> int:
@@ -46,7 +46,7 @@ def main(words: Sequence[str]) -> int:
 
 def parse(words: Sequence[str]) -> tuple[list[str], Path, list[str]]:
     """Documents (all of them if none is named), folder and overrides; raises ConfigError."""
-    names, overrides, folder = [], [], FOLDER
+    names, overrides, folder = [], [], FOLDER.absolute()
     rest = iter(words)
     for word in rest:
         if word == "--folder":

@@ -12,7 +12,7 @@ from pathlib import Path
 from pathlib import Path as File
 
 from pipeline.common.errors import RobotError
-from pipeline.common.files import PROJECT
+from pipeline.common.files import shipped
 
 PREFIX = "package://"
 
@@ -79,6 +79,6 @@ def find(name: str) -> File:
     if name.startswith(PREFIX):
         return locate(name, "robot.urdf")
     given = File(name).expanduser()
-    if not given.is_absolute() and not given.is_file() and (PROJECT / given).is_file():
-        return PROJECT / given
+    if not given.is_absolute() and not given.is_file() and (ours := shipped(name)).is_file():
+        return ours
     return given.absolute()  # kept results are found again from any working directory

@@ -20,12 +20,12 @@ from omegaconf import DictConfig
 from omegaconf.errors import OmegaConfBaseException
 
 from pipeline.common.errors import InputError, OutputError
-from pipeline.common.files import PROJECT
+from pipeline.common.files import shipped
 from pipeline.config.compose import checked
 from pipeline.config.fields import unknown_key
 from pipeline.run import session
 
-CONF = str(PROJECT / "conf")
+CONF = str(shipped("conf"))
 
 
 def job(values: DictConfig) -> int:

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.common.files import PROJECT
+from pipeline.common.files import shipped
 from pipeline.model.arm import Arm
 from pipeline.model.task import PositionTask
 from pipeline.problem.secondary import Secondary, joint_centering, manipulability
@@ -12,7 +12,7 @@ from tests.support import differences
 
 @pytest.fixture(scope="module")
 def unit() -> PositionTask:
-    return PositionTask(Arm.from_urdf(PROJECT / "robots" / "unit3r.urdf", "tip"))
+    return PositionTask(Arm.from_urdf(shipped("robots/unit3r.urdf"), "tip"))
 
 
 def test_the_jacobians_derivative_equals_central_differences(unit: PositionTask, rng: np.random.Generator) -> None:
