@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
-import time
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -21,7 +17,9 @@ from pipeline.common.workers import Workers
 from pipeline.config.run import RunConfig
 from pipeline.problem.problem import Problem
 from pipeline.run import run as run_module
-from tests.run.test_main import ROOT, Answer, call, command
+from tests.killed import run_and_kill
+from tests.run.test_main import Answer, call, command
+from tests.tasks import kept
 
 Sweep = Callable[..., Answer]
 LSV = ("-m", "name=traj1", "methods=[lsv]", "timing.steps=10", "path=line", "hydra.sweep.dir=all")
@@ -165,18 +163,9 @@ def test_launchers(launcher: tuple[str, str], sweep: Sweep, tmp_path: Path) -> N
 def test_a_killed_sweep_goes_on(sweep: Sweep, tmp_path: Path) -> None:
     few = [f"method.global.{key}" for key in ("configurations=8", "candidates=60", "optimised=6")]
     more = ["+experiment=sim1", "methods=[global]", "timing.steps=26", *few, "path.length=0.4", "seed=1,2"]
-    environment = {**os.environ, "PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
-    line = [sys.executable, "-m", "pipeline", *LSV, *more, "name=sim1", "parallel.workers=1"]
-    process = subprocess.Popen(line, cwd=tmp_path, env=environment, stdout=subprocess.DEVNULL)
-    try:  # the first run is finished, the second at work
-        until = time.monotonic() + 60
-        while len(list((tmp_path / "all" / "1_sim1" / run_module.UNFINISHED).glob("*.pickle"))) < 2:
-            assert process.poll() is None, "the sweep ended before it could be killed"
-            assert time.monotonic() < until
-            time.sleep(0.005)
-    finally:
-        process.kill()
-        process.wait()
+    # The first run is finished, the second at work.
+    run_and_kill(Path("1_sim1"), 2, *LSV, *more, "name=sim1", "parallel.workers=1", cwd=tmp_path)
+    assert len(kept(tmp_path / "all" / "1_sim1" / run_module.UNFINISHED)) == 2
     record = (tmp_path / "all" / "0_sim1" / "run.json").read_bytes()
     assert not (tmp_path / "all" / "1_sim1" / "run.json").exists()
     again = sweep(*more, "name=sim1", "parallel.workers=2")
