@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -60,9 +61,7 @@ ROBOTS = ("planar3r", "planar4r", "panda", "xarm7")
 def robot(name: str, **mounting: Any) -> Arm:
     """The arm of `robot=<name>`, with gravity and rotor inertia where it is asked for."""
     arm = load(composed(f"robot={name}").robot)
-    for key, value in mounting.items():
-        setattr(arm, key, np.asarray(value, dtype=float))
-    return arm
+    return Arm(arm.description, replace(arm.mounting, **mounting))
 
 
 def within_limits(arm: Arm, count: int, rng: np.random.Generator) -> Array:

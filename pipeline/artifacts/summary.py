@@ -103,7 +103,7 @@ def _base(problem: Problem, e: Evaluation) -> dict[str, Any]:
     if base.reaction is not None:
         peaks = [float(np.linalg.norm(base.reaction[:, part], axis=1).max()) for part in (slice(3), slice(3, 6))]
         row = dict(zip(("peak_reaction_force", "peak_reaction_torque"), peaks, strict=True))
-        names = ("reaction_force", "reaction_torque") if problem.task.arm.base_coordinates else ()
+        names = ("reaction_force", "reaction_torque") if problem.task.arm.base.count else ()
         return row | {f"{name}_integral": e.integral(name) for name in names}
     floating = base.floating
     return {

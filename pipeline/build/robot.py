@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
+import difflib
 from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
 from pipeline.common.arrays import Array
-from pipeline.common.errors import ConfigError
-from pipeline.common.errors import RobotError
-from pipeline.config.robot import CapsuleConfig
-from pipeline.config.robot import RobotConfig
-from pipeline.config.robot import SphereConfig
+from pipeline.common.errors import ConfigError, RobotError
+from pipeline.config.robot import CapsuleConfig, RobotConfig, SphereConfig
 from pipeline.model.arm import Arm
 from pipeline.robot import urdf
 from pipeline.robot.description import Description
+from pipeline.robot.mounting import Mounting
 from pipeline.robot.packages import find
-from pipeline.robot.shapes import Shape
-from pipeline.robot.shapes import capsule
-from scipy.spatial.transform import Rotation
-from typing import Any
-import difflib
-import numpy as np
+from pipeline.robot.shapes import Shape, capsule
 
 GRAVITY = {"none": (0.0, 0.0, 0.0), "earth": (0.0, 0.0, -9.80665)}  # [m/s^2]
 
@@ -33,16 +32,17 @@ def load(robot: RobotConfig, gravity: str | list[float] = "none") -> Arm:
         raise ConfigError(
             f"robot.armature has {len(robot.armature)} values, the arm has {len(description.joints)} moving joints"
         )
-    return Arm(
-        description,
-        robot.offset,
-        offset_rpy=robot.offset_rpy,
-        base_position=robot.base_position,
-        base_rpy=robot.base_rpy,
-        gravity=GRAVITY[gravity] if isinstance(gravity, str) else gravity,
+    armature = robot.armature
+    mounting = Mounting(
+        offset=tuple(robot.offset),
+        offset_rpy=tuple(robot.offset_rpy),
+        base_position=tuple(robot.base_position),
+        base_rpy=tuple(robot.base_rpy),
+        gravity=GRAVITY[gravity] if isinstance(gravity, str) else tuple(gravity),
         payload=robot.payload,
-        armature=robot.armature,
+        armature=tuple(armature) if isinstance(armature, list) else armature,
     )
+    return Arm(description, mounting)
 
 
 def initial(robot: RobotConfig, arm: Arm) -> Array:

@@ -51,10 +51,11 @@ def inspect(robot: RobotConfig, gravity: str | list[float] = "none") -> Facts:
         notes.append(f"robot.q_init of {description.joints[joint]} is outside its limits")
     if description.meshes and not description.collision:
         notes.append("collision shapes are meshes: for obstacles give spheres, boxes or capsules in robot.collision")
-    if arm.payload > 0:
-        notes.append(f"a payload of {arm.payload:g} kg at the end effector")
-    if np.any(arm.armature):
-        notes.append(f"rotor inertia {', '.join(f'{a:g}' for a in arm.armature)} kg m^2 added to the joints")
+    if arm.mounting.payload > 0:
+        notes.append(f"a payload of {arm.mounting.payload:g} kg at the end effector")
+    rotors = arm.mounting.rotors(arm.n)
+    if rotors.any():
+        notes.append(f"rotor inertia {', '.join(f'{a:g}' for a in rotors)} kg m^2 added to the joints")
     missing = [
         mesh
         for mesh in description.pictures

@@ -11,12 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.common.arrays import Array
-from pipeline.evaluation.base import Base, angle_between, base_motion, entered_cycle
+from pipeline.evaluation.base import BaseMotion, angle_between, base_motion, entered_cycle
 from pipeline.evaluation.between import between_knots
-from pipeline.evaluation.limits import LIMITS, clearances, limit_excess
+from pipeline.evaluation.clearance import Clearance
+from pipeline.evaluation.limits import LIMITS, limit_excess
 from pipeline.evaluation.plant import SinglePlant
 from pipeline.evaluation.sums import differences, running_integral, weighted_sum
-from pipeline.model.clearance import Clearance
 from pipeline.problem.problem import Boundary, Problem
 from pipeline.problem.solution import Solution, Status
 
@@ -58,7 +58,7 @@ class Evaluation:
     clearance_between: float  # smallest along that spline
     limit_excess: dict[str, float]  # by kind, at the knots, relative; see limit_excess()
     limit_excess_between: dict[str, float]  # the same along that spline
-    base: Base
+    base: BaseMotion
 
     @property
     def method(self) -> str:
@@ -87,11 +87,11 @@ def evaluate(problem: Problem, solution: Solution) -> Evaluation:
     dt = np.diff(time)
     qd, qdd = differences(trajectory, problem.boundary, problem.reference.timing.at_rest)
     plant = SinglePlant(arm)
-    if arm.floats and problem.boundary is Boundary.CYCLIC:
+    if arm.base.kind == "floating" and problem.boundary is Boundary.CYCLIC:
         qd, qdd = entered_cycle(plant, trajectory, qd)
     count, n = q.shape
     tau, energy, radius = np.full((count, n), np.nan), np.full(count, np.nan), np.full(count, np.nan)
-    skeleton, singular = np.full((count, n - arm.base_coordinates + 1, 3), np.nan), np.full(count, np.nan)
+    skeleton, singular = np.full((count, n - arm.base.count + 1, 3), np.nan), np.full(count, np.nan)
     place, way = np.full((count, 3), np.nan), np.full((count, 3, 3), np.nan)
     tracking, turned, targets = np.full(count, np.nan), np.full(count, np.nan), problem.reference.position(time)
     for i in np.flatnonzero(np.isfinite(np.hstack([q, qd, qdd])).all(axis=1)):  # Drake refuses other values
@@ -106,16 +106,16 @@ def evaluate(problem: Problem, solution: Solution) -> Evaluation:
     # At the first knot nothing has been spent yet: the interval's values stand at its end.
     tau[0] = tau[0] if problem.boundary is Boundary.CYCLIC else 0.0
     position = skeleton[:, -1]
-    scene = None if problem.obstacles is None else Clearance(arm, problem.obstacles)
-    clearance = clearances(scene, q)
+    distances = Clearance(arm, problem.obstacles)
+    clearance = distances(q)
     turn = angle_between(plant.start, way)
     excess = limit_excess(problem, q, qd, tau, float(clearance.min()), float(turn.max()))
     spline_integral, spline_objective, between, turned_between, clear_between, excess_between = between_knots(
-        problem, plant, scene, trajectory, qd[0]
+        problem, plant, distances, trajectory, qd[0]
     )
     secondary = np.array([plant.secondary(problem, qi) for qi in q]) if problem.objective.secondary else np.zeros(count)
     moving = q
-    q, qd, qdd, tau = (values[:, arm.base_coordinates :] for values in (q, qd, qdd, tau))
+    q, qd, qdd, tau = (values[:, arm.joints] for values in (q, qd, qdd, tau))
     base = base_motion(problem, solution, place, way, turn, (q, qd, qdd))
     energy_integral, torque_integral = running_integral(energy, dt), running_integral((tau**2).sum(axis=1), dt)
     velocity_norm_integral = running_integral((qd**2).sum(axis=1), dt)

@@ -16,8 +16,9 @@ from scipy.interpolate import CubicSpline
 from pipeline.common.arrays import Array
 from pipeline.common.workers import Workers
 from pipeline.config.methods import GlobalOptions
-from pipeline.model.clearance import Clearance, Obstacles
+from pipeline.model.clearance import Clearance
 from pipeline.model.kinematics import wrap
+from pipeline.model.obstacles import Obstacles
 from pipeline.problem.costs import SECOND_ORDER, objective_values
 from pipeline.problem.lagrangian import Lagrangian
 from pipeline.problem.limits import LIMIT_KINDS
@@ -25,7 +26,7 @@ from pipeline.problem.objective import Objective
 from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Progress, Solution, Status, Trajectory, no_progress
 from pipeline.program.feasibility import Relaxed, least_violation, violations
-from pipeline.program.program import Transcription
+from pipeline.program.transcription import transcribe
 from pipeline.search.configurations import starting_points
 from pipeline.search.population import population, ranking
 from pipeline.search.selection import distinct, diverse
@@ -254,7 +255,7 @@ def _optimise_lazily(
 
 
 def _optimise(problem: Problem, times: Array, guess: Array, options: GlobalOptions, keep_off: float = 0.0) -> Optimum:
-    program = Transcription(problem, times, guess, keep_off=keep_off)
+    program = transcribe(problem, times, guess, keep_off=keep_off)
     last = len(times) == len(problem.times)
     q, outcome, iterations = program.solve(
         tolerance=options.tolerance if last else max(options.tolerance, ROUGH_TOLERANCE),

@@ -26,7 +26,7 @@ from pipeline.problem.limits import LIMIT_KINDS
 from pipeline.problem.objective import IntegralBounds, Objective
 from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Progress, Solution, Status, Trajectory, no_progress
-from pipeline.program.program import Transcription
+from pipeline.program.transcription import transcribe
 from pipeline.search.selection import path_distance
 
 SAME_CLASS = 0.6  # [rad] neighbouring points of one class of paths differ by less at every knot
@@ -167,7 +167,7 @@ def _solve_point(context: tuple[Problem, ParetoOptions], item: tuple[Point, Arra
     bounds = IntegralBounds() if point.bounded is None else IntegralBounds(**{point.bounded: point.bound})
     objective = _objective(options, point.weights)
     stated = replace(problem, objective=objective, integral_bounds=bounds)
-    q, outcome, _ = Transcription(stated, problem.times, guess).solve(
+    q, outcome, _ = transcribe(stated, problem.times, guess).solve(
         tolerance=options.tolerance, max_iterations=options.max_iterations
     )
     converged = outcome.converged and global_planner.stays_on_path(problem, problem.times, q)

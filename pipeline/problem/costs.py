@@ -12,7 +12,6 @@ import numpy as np
 
 from pipeline.common.arrays import Array
 from pipeline.model.arm import Arm
-from pipeline.model.base import FloatingArm
 from pipeline.problem.lagrangian import Lagrangian
 from pipeline.problem.objective import Objective
 from pipeline.problem.problem import Boundary, Problem
@@ -67,7 +66,7 @@ def _entering(problem: Problem, q: Array, last: Array) -> Array:
 
 def row_kinds(arm: Arm) -> list[str]:
     """The integral to which each of the n generalized forces of an arm belongs."""
-    nb = arm.base_coordinates
+    nb = arm.base.count
     forces = nb - 1 if nb == 3 else nb // 2
     return ["reaction_force"] * forces + ["reaction_torque"] * (nb - forces) + ["torque"] * (arm.n - nb)
 
@@ -87,8 +86,8 @@ def integrals(problem: Problem, times: Array, q: Array) -> Costs:
     energy = arm.kinetic_energy(q[1:], qd[1:])
     gain = float(Lagrangian(problem.task, problem.objective).gain_integrals(times, q[None])[0])
     forces = {kind: float(squares(arm, tau, {kind: 1.0}) @ dt) for kind in SECOND_ORDER}
-    joints = qd[1:, arm.base_coordinates :]
-    turning = arm.turning(q[1:], qd[1:])[0] @ dt if isinstance(arm, FloatingArm) else 0.0
+    joints = qd[1:, arm.joints]
+    turning = arm.base.turning(q[1:], qd[1:])[0] @ dt
     return Costs(
         kinetic_energy=float(energy @ dt),
         velocity_norm=float((joints**2).sum(axis=1) @ dt),

@@ -6,7 +6,7 @@ import enum
 from dataclasses import dataclass, field
 
 from pipeline.common.arrays import Array
-from pipeline.model.clearance import Obstacles
+from pipeline.model.obstacles import Obstacles
 from pipeline.model.task import Task
 from pipeline.path.reference import Reference
 from pipeline.problem.limits import Limits

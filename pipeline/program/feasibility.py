@@ -8,11 +8,11 @@ import numpy as np
 
 from pipeline.common.arrays import Array
 from pipeline.model.arm import Arm
-from pipeline.model.base import FloatingArm
-from pipeline.model.clearance import Clearance, Obstacles
+from pipeline.model.clearance import Clearance
+from pipeline.model.obstacles import Obstacles
 from pipeline.problem.costs import integrals, velocities
 from pipeline.problem.problem import Problem
-from pipeline.program.program import Transcription
+from pipeline.program.transcription import transcribe
 
 UNITS = {"position": "rad", "velocity": "rad/s", "torque": "N m", "power": "W", "clearance": "m", "attitude": "rad"}
 
@@ -62,9 +62,9 @@ def violations(problem: Problem, times: Array, q: Array) -> list[Violation]:
 
 def _turned(problem: Problem, times: Array, q: Array) -> Violation | None:
     arm, bound = problem.task.arm, problem.bounds.attitude
-    if not np.isfinite(bound) or not isinstance(arm, FloatingArm):
+    if not np.isfinite(bound):
         return None
-    angle = np.arccos(np.clip(arm.attitude_cosine(q)[0], -1.0, 1.0))
+    angle = np.arccos(np.clip(arm.base.attitude_cosine(q)[0], -1.0, 1.0))
     knot = int(np.argmax(angle))
     return Violation(
         "attitude", "the base", bound, float(angle[knot]), float(times[knot]), float(angle[knot] / bound - 1)
@@ -127,7 +127,7 @@ def least_violation(problem: Problem, times: Array, guesses: list[Array]) -> Rel
 def _relaxed(problem: Problem, times: Array, guesses: list[Array], kinds: list[str]) -> Relaxed | None:
     best: Relaxed | None = None
     for guess in guesses:
-        q, outcome, _ = Transcription(problem, times, guess, elastic=kinds).solve(tolerance=1e-6, max_iterations=150)
+        q, outcome, _ = transcribe(problem, times, guess, elastic=kinds).solve(tolerance=1e-6, max_iterations=150)
         gap = np.abs(problem.task.error(q, problem.reference.position(times))).max()
         if not outcome.converged or gap > 1e-6:
             continue

@@ -28,7 +28,7 @@ UNFINISHED = ".unfinished"  # finished solves of a run that is not finished: wha
 def state(config: RunConfig) -> Problem:
     """The problem of a configuration, refused before anything is solved if a method asked for does not serve it."""
     problem = prepare(config)
-    if problem.task.arm.base_coordinates:
+    if problem.task.arm.base.count:
         _require_fixed_base(config)
     if "dynamic_programming" in config.methods or (
         "global" in config.methods and config.method.global_.starts != "population"
@@ -135,7 +135,7 @@ def run_and_write(config: RunConfig, folder: File) -> int:
     timed("tables", begin)
     begin = time.perf_counter()
     figures.write(folder / "figures", problem, extra.shown(evaluations), name=config.name)
-    if problem.task.arm.base_coordinates:
+    if problem.task.arm.base.count:
         base_figure.write(folder / "figures", problem, extra.shown(evaluations), name=config.name)
     if extra.closed_loop is not None:
         closed_loop_figure.write(folder / "figures", extra.closed_loop, problem, name=config.name)

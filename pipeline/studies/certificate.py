@@ -9,7 +9,7 @@ from scipy.interpolate import CubicSpline
 from pipeline.problem.costs import objective_values
 from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Solution, Status
-from pipeline.program.program import Transcription
+from pipeline.program.transcription import transcribe
 
 
 def certify(problem: Problem, optimum: Solution, grid_optimum: Solution) -> dict[str, float]:
@@ -20,7 +20,7 @@ def certify(problem: Problem, optimum: Solution, grid_optimum: Solution) -> dict
     """
     times = grid_optimum.trajectory.time
     guess = CubicSpline(optimum.trajectory.time, optimum.trajectory.q)(times)
-    q, outcome, _ = Transcription(replace(problem, times=times), times, guess).solve()
+    q, outcome, _ = transcribe(replace(problem, times=times), times, guess).solve()
     cost = float(objective_values(problem, times, q[None])[0]) if outcome.converged else float("nan")
     grid_cost = float(grid_optimum.statistics["cost"])
     return {

@@ -148,10 +148,9 @@ def simulate(problem: Problem, evaluation: Evaluation, options: ClosedLoopConfig
 def _plant(arm: Arm) -> Any:
     """The arm with one motor per joint."""
     plant = MultibodyPlant(0.0)
-    xml, root = arm.description.for_drake
-    model, _ = assemble(arm, plant, xml, root, Parser(plant))
-    plant.mutable_gravity_field().set_gravity_vector(arm.gravity)
-    for name, rotor in zip(arm.description.joints, arm.armature, strict=True):
+    model, _ = assemble(plant, Parser(plant), arm.description, arm.mounting)
+    plant.mutable_gravity_field().set_gravity_vector(arm.mounting.gravity)
+    for name, rotor in zip(arm.description.joints, arm.mounting.rotors(arm.n), strict=True):
         motor = plant.AddJointActuator(name, plant.GetJointByName(name, model))
         motor.set_default_rotor_inertia(rotor)
     plant.Finalize()

@@ -12,7 +12,7 @@ from pipeline.model.kinematics import wrap
 from pipeline.problem.costs import objective_values
 from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Solution, Status
-from pipeline.program.program import Transcription
+from pipeline.program.transcription import transcribe
 
 HALVINGS = 3
 
@@ -32,7 +32,7 @@ def table(problem: Problem, solutions: list[Solution]) -> pd.DataFrame | None:
         intervals = max(2, (len(optimum.time) - 1) >> halving)
         times = np.interp(np.linspace(0, place[-1], intervals + 1), place, optimum.time)
         guess = CubicSpline(optimum.time, optimum.q)(times)
-        q, outcome, _ = Transcription(replace(problem, times=times), times, guess).solve(tolerance=1e-10)
+        q, outcome, _ = transcribe(replace(problem, times=times), times, guess).solve(tolerance=1e-10)
         if not outcome.converged:
             continue
         value = float(objective_values(problem, times, q[None])[0])

@@ -56,7 +56,7 @@ def curve(problem: Problem, time: Array, q: Array) -> CubicSpline:
 
 def _whole(problem: Problem, evaluation: Evaluation) -> Callable[..., Array]:
     """The same curve with a moving base's coordinates before the joints'."""
-    nb, joints = problem.task.arm.base_coordinates, curve(problem, evaluation.time, evaluation.q)
+    nb, joints = problem.task.arm.base.count, curve(problem, evaluation.time, evaluation.q)
     if not nb:
         return joints
     base = CubicSpline(evaluation.time, evaluation.solution.trajectory.q[:, :nb])

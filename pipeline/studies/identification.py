@@ -35,7 +35,7 @@ from pipeline.model.arm import Arm
 from pipeline.model.task import PositionTask
 from pipeline.problem.costs import integrals, velocities
 from pipeline.problem.problem import Problem
-from pipeline.program.program import Transcription
+from pipeline.program.transcription import transcribe
 from pipeline.robot.description import Description
 
 FEW = GlobalOptions(candidates=200, optimised=12)  # starts that find every optimum that is printed
@@ -142,11 +142,12 @@ def masses_of(description: Description) -> Array:
 
 
 def with_masses(arm: Arm, masses: Array) -> Arm:
-    """The same arm with other masses (n,) [kg]; lengths, centres of gravity and moments of inertia stay."""
-    root, elements = _mass_elements(arm.description)
+    """The same arm with other masses [kg] (joints,); all else of its links, its mounting and its base stay."""
+    description = arm.on_fixed_base.description
+    root, elements = _mass_elements(description)
     for element, mass in zip(elements, masses, strict=True):
         element.set("value", repr(float(mass)))
-    return Arm(replace(arm.description, xml=ET.tostring(root, encoding="unicode")), tuple(arm.offset))
+    return Arm(replace(description, xml=ET.tostring(root, encoding="unicode")), arm.mounting, arm.base)
 
 
 def _mass_elements(description: Description) -> tuple[ET.Element, list[ET.Element]]:
@@ -223,7 +224,7 @@ def _moved(masses: Array, item: tuple[str, str, int, Array]) -> tuple[Array, dic
     name, method, _, q = item
     problem = _problem(name, masses)
     if method == "global":
-        q = Transcription(problem, problem.times, q).solve(tolerance=1e-8, max_iterations=200)[0]
+        q = transcribe(problem, problem.times, q).solve(tolerance=1e-8, max_iterations=200)[0]
     return q, quantities(problem, q)
 
 

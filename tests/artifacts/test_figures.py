@@ -21,7 +21,7 @@ from pipeline.artifacts.figures.panels import thin
 from pipeline.artifacts.figures.stroboscopic import stroboscopic
 from pipeline.common.arrays import Array
 from pipeline.evaluation.evaluation import Evaluation, evaluate
-from pipeline.model.clearance import Obstacles
+from pipeline.model.obstacles import Obstacles
 from pipeline.model.task import PositionTask
 from pipeline.path.curves import Line, direction_vector
 from pipeline.path.reference import Reference

@@ -27,7 +27,7 @@ from pipeline.config.methods import GlobalOptions, LsvOptions
 from pipeline.evaluation.evaluation import Evaluation, evaluate
 from pipeline.methods import global_planner, lsv
 from pipeline.model.arm import Arm
-from pipeline.model.clearance import Obstacles
+from pipeline.model.obstacles import Obstacles
 from pipeline.model.task import PositionTask
 from pipeline.path.curves import Line, direction_vector
 from pipeline.path.reference import Reference

@@ -13,8 +13,7 @@ from scipy.spatial.transform import Rotation
 from pipeline.artifacts.recording.recording import read_series
 from pipeline.artifacts.scene import box, corners
 from pipeline.build.problem import prepare
-from pipeline.evaluation.base import Base
-from pipeline.model.base import FloatingArm
+from pipeline.evaluation.base import BaseMotion
 from pipeline.run import run
 from tests.support import composed
 
@@ -79,11 +78,10 @@ def test_the_box_has_the_mass_and_inertia() -> None:
     moments = mass * (np.sum(edges**2) - edges**2) / 12
     words = ("robot=panda", "path.direction=[0,1,0]", "base=free", f"base.mass={mass}", "base.com=[0,0,-0.2]")
     problem = prepare(composed(*words, f"base.inertia={moments.tolist()}"))
-    assert isinstance(problem.task.arm, FloatingArm)
     shape = box(problem.task.arm)
     seen = np.abs(Rotation.from_rotvec(shape.rotation).apply(np.diag(shape.size))).sum(axis=0)
     np.testing.assert_allclose(seen, edges, rtol=1e-9)
-    still = Base(np.zeros((1, 3)), np.eye(3)[None], np.zeros(1), None, {}, None)
+    still = BaseMotion(np.zeros((1, 3)), np.eye(3)[None], np.zeros(1), None, {}, None)
     placed = corners(problem.task.arm, still)[0]
     np.testing.assert_allclose(placed.min(axis=0), [-0.4, -0.3, -0.4], atol=1e-9)
     np.testing.assert_allclose(placed.max(axis=0), [0.4, 0.3, 0.0], atol=1e-9)

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tests.support import composed
 
-from pipeline.run import run
-from pipeline.common.errors import ConfigError
-from pipeline.model.base import FloatingArm
 from pipeline.build.problem import prepare
+from pipeline.common.errors import ConfigError
+from pipeline.run import run
+from tests.support import composed
 
 FREE = ("base=free", "base.mass=10", "base.inertia=0.2")
 PANDA = ("robot=panda", "path.direction=[0,1,0]", "path.length=0.1")
@@ -51,10 +50,10 @@ def test_what_does_not_go_together(words: tuple[str, ...], message: str) -> None
 
 def test_a_planar_arm_has_three_more_coordinates_and_a_spatial_one_six() -> None:
     plane, space = prepare(composed(*FREE)), prepare(composed(*PANDA, *FREE, "limits=joint", "limits.attitude=0.2"))
-    assert plane.task.arm.base_coordinates == 3
+    assert plane.task.arm.base.count == 3
     assert plane.task.redundancy == 1
     np.testing.assert_array_equal(plane.q_init, [0, 0, 0, 0, 0.327, -0.754])
-    assert space.task.arm.base_coordinates == 6
+    assert space.task.arm.base.count == 6
     assert space.task.redundancy == 4
     assert np.isinf(space.bounds.upper[:6]).all()
     assert np.isfinite(space.bounds.upper[6:]).all()
@@ -73,6 +72,6 @@ def test_the_root_link_or_a_body_bolted_to_it() -> None:
 
 def test_a_reaction_holds_the_base() -> None:
     problem = prepare(composed("objective=reaction", "gravity=earth"))
-    assert isinstance(problem.task.arm, FloatingArm)
-    assert not problem.task.arm.floats
-    assert prepare(composed()).task.arm.base_coordinates == 0
+    assert problem.task.arm.base.kind == "held"
+    assert problem.task.arm.base.count == 3
+    assert prepare(composed()).task.arm.base.kind == "fixed"

@@ -19,7 +19,7 @@ from pipeline.problem.limits import Limits
 from pipeline.problem.objective import Objective
 from pipeline.problem.problem import Boundary, Problem
 from pipeline.problem.solution import Solution, Status, Trajectory
-from pipeline.program.program import Transcription
+from pipeline.program.transcription import transcribe
 
 Make = Callable[[int, int], Problem]
 Guess = Callable[[Problem], Array]
@@ -157,7 +157,7 @@ def test_differences_by_boundary() -> None:
 def test_the_published_optima(problem: Make, guess: Guess, number: int, published: float) -> None:
     """PMKE paper, Table 5, 101 points, in the digits that independent software gives."""
     asked = problem(number, 100)
-    q, _, _ = Transcription(asked, asked.times, guess(asked)).solve()
+    q, _, _ = transcribe(asked, asked.times, guess(asked)).solve()
     got = evaluate(asked, Solution("global", Trajectory(asked.times, q), Status.SOLVED, tracking_tolerance=1e-8))
     assert got.confirmed
     assert got.energy_integral[-1] == pytest.approx(published, rel=2e-4)

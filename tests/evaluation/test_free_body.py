@@ -14,13 +14,12 @@ from pipeline.evaluation.evaluation import Evaluation, evaluate
 from pipeline.evaluation.free_body import BasePlant, integrate
 from pipeline.methods import global_planner, lsv
 from pipeline.methods.pmke import predictive as pmke
-from pipeline.model.base import FloatingArm
 from pipeline.problem.costs import integrals
 from pipeline.problem.objective import IntegralBounds, Objective
 from pipeline.problem.problem import Boundary, Problem
 from pipeline.problem.solution import Solution, Status, Trajectory
 from pipeline.program.feasibility import least_violation, violations
-from pipeline.program.program import Transcription
+from pipeline.program.transcription import transcribe
 from tests.program.test_program import program_jacobian, program_value
 from tests.support import composed
 
@@ -40,11 +39,6 @@ def stated(*overrides: str) -> tuple[Problem, Solution]:
 def solved(*overrides: str) -> tuple[Problem, Evaluation]:
     problem, solution = stated(*overrides)
     return problem, evaluate(problem, solution)
-
-
-def floating(problem: Problem) -> FloatingArm:
-    assert isinstance(problem.task.arm, FloatingArm)
-    return problem.task.arm
 
 
 STARTS = {"fixed": (), "free": ("boundary=free",), "cyclic": CIRCLE}
@@ -89,8 +83,8 @@ def test_the_path_error_is_of_second_order_in_the_step() -> None:
     errors = []
     for steps in (50, 100, 200):
         problem, solution = stated(*ON_BASE[:-2], f"timing.steps={steps}", "method.global.optimised=1")
-        nb = problem.task.arm.base_coordinates
-        found = integrate(problem, floating(problem), solution.trajectory.time, solution.trajectory.q[:, nb:])
+        joints = solution.trajectory.q[:, problem.task.arm.joints]
+        found = integrate(problem, solution.trajectory.time, joints)
         errors.append(found.path_error)
     order = np.log2(np.array(errors[:-1]) / errors[1:])
     assert errors[-1] < 1e-6
@@ -260,8 +254,7 @@ def test_least_reaction_on_a_held_base() -> None:
     words = (*SHORT, "boundary=free", "objective=reaction", "objective.force=0.1")
     problem, e = solved(*words)
     plain, energy = solved(*SHORT, "boundary=free")
-    assert isinstance(problem.task.arm, FloatingArm)
-    assert not problem.task.arm.floats
+    assert problem.task.arm.base.kind == "held"
     assert e.status is Status.SOLVED, e.message
     assert e.objective == pytest.approx(0.1 * e.integral("reaction_force") + e.integral("reaction_torque"))
     costs = integrals(problem, problem.times, e.solution.trajectory.q)
@@ -328,8 +321,8 @@ def test_derivatives_of_the_whole_program(kind: str, elastic: tuple[str, ...], r
         problem = replace(problem, boundary=Boundary.FREE)
     problem = replace(problem, **changes)
     guess = problem.q_init + np.cumsum(0.05 * rng.normal(size=(14, problem.task.arm.n)), axis=0)
-    made = Transcription(problem, problem.times, guess, elastic=elastic)
-    x = 0.3 * rng.normal(size=made.program.num_vars())
+    made = transcribe(problem, problem.times, guess, elastic=elastic)
+    x = 0.3 * rng.normal(size=made.drake.num_vars())
     x[: made.y.size] = 0.03 * (guess + 0.1 * rng.normal(size=guess.shape)).ravel()
     jacobian, h = program_jacobian(made, x), 1e-6
     for _ in range(6):

@@ -18,7 +18,7 @@ from pipeline.methods import global_planner, pareto
 from pipeline.problem.objective import IntegralBounds, Objective
 from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Status
-from pipeline.program.program import Transcription
+from pipeline.program.transcription import transcribe
 from pipeline.run.main import CONF
 from pipeline.studies import front
 
@@ -105,7 +105,7 @@ def test_a_bounded_integral_is_met_exactly(problem: Problem) -> None:
     free = evaluate(problem, global_planner.solve(problem, replace(FEW, optimised=2))[0])
     bound = 1.05 * free.energy_integral[-1]
     stated = replace(problem, objective=Objective(0.0, 1.0), integral_bounds=IntegralBounds(kinetic_energy=bound))
-    q, outcome, _ = Transcription(stated, problem.times, start).solve()
+    q, outcome, _ = transcribe(stated, problem.times, start).solve()
     assert outcome.converged
     solution = replace(free.solution, trajectory=replace(free.solution.trajectory, q=q))
     assert evaluate(problem, solution).energy_integral[-1] == pytest.approx(bound, rel=1e-6)

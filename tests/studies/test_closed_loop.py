@@ -17,6 +17,7 @@ from pipeline.model.arm import Arm
 from pipeline.model.task import PositionTask
 from pipeline.problem.limits import Limits
 from pipeline.problem.problem import Problem
+from pipeline.robot.mounting import Mounting
 from pipeline.studies.closed_loop import ClosedLoop, simulate
 from tests.support import composed, robot
 
@@ -114,11 +115,13 @@ def test_gravity_payload_rotors_and_a_placed_base(case: Case) -> None:
     problem, _ = case
     arm = Arm(
         robot("planar3r").description,
-        gravity=(0.0, -0.1, -9.8),
-        payload=0.1,
-        armature=0.04,
-        base_position=(0.2, 0.1, 0.3),
-        base_rpy=(0.0, 0.0, 0.4),
+        Mounting(
+            gravity=(0.0, -0.1, -9.8),
+            payload=0.1,
+            armature=0.04,
+            base_position=(0.2, 0.1, 0.3),
+            base_rpy=(0.0, 0.0, 0.4),
+        ),
     )
     task = PositionTask(arm)
     start = task.value(problem.q_init[None])[0]

@@ -11,7 +11,7 @@ from pipeline.build.problem import prepare
 from pipeline.config.methods import GlobalOptions
 from pipeline.evaluation.evaluation import Evaluation, evaluate
 from pipeline.methods import global_planner
-from pipeline.model.clearance import Obstacles
+from pipeline.model.obstacles import Obstacles
 from pipeline.path.timing import ConstantSpeed
 from pipeline.problem.limits import Limits
 from pipeline.problem.problem import Problem

@@ -17,7 +17,7 @@ from pipeline.problem.problem import Problem
 
 def draw(problem: Problem, evaluations: Sequence[Evaluation], name: str) -> Figure:
     """Floating: turn, shift, and the running integral of the squared angular velocity. Held: force and torque."""
-    floats = problem.task.arm.floats
+    floats = problem.task.arm.base.kind == "floating"
     figure = new_figure(f"{name}: the base {'floats' if floats else 'is held'}", 10.0, 7.5 if floats else 6.0)
     panels = stacked_panels(figure, problem, 3 if floats else 2)
     labels = ("Turn from the start [deg]", "Shift from the start [m]", r"$\int|\omega|^2\,dt$ [rad$^2$/s]")

@@ -156,4 +156,4 @@ def _ranges(problem: Problem) -> Array:
     bounds, secondary = problem.bounds, problem.objective.secondary
     if secondary is not None and "joint_centering" in secondary.criteria:
         return np.array([secondary.lower, secondary.upper])
-    return np.array([bounds.lower, bounds.upper])[:, problem.task.arm.base_coordinates :]
+    return np.array([bounds.lower, bounds.upper])[:, problem.task.arm.joints]

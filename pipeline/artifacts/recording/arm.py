@@ -82,8 +82,8 @@ def draw_arm(
             solid = getattr(rr, shape).from_fields(colors=[color], fill_mode="solid")
             recording.log(entity, solid, static=True)
     stand = rr.Transform3D(
-        translation=arm.base_position,
-        quaternion=Rotation.from_euler("xyz", arm.base_rpy).as_quat(),
+        translation=arm.mounting.base_position,
+        quaternion=Rotation.from_euler("xyz", arm.mounting.base_rpy).as_quat(),
         parent_frame="tf#/",
         child_frame=f"{root}/{description.base}",
     )

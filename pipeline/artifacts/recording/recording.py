@@ -26,7 +26,7 @@ from pipeline.artifacts.recording.blueprint import faded, pixels, rgba, slug
 from pipeline.artifacts.scene import box, corners, outlines
 from pipeline.common.arrays import Array
 from pipeline.evaluation.evaluation import Evaluation
-from pipeline.model.base import FloatingArm
+from pipeline.model.arm import Arm
 from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Status
 from pipeline.robot.shapes import Shape
@@ -96,13 +96,13 @@ def read_series(file: Path, entity: str) -> tuple[Array, Array]:
 
 
 def _layout(problem: Problem, evaluations: Sequence[Evaluation], front: bool) -> Any:
-    points = [problem.task.arm.base_position[None], _reference(problem)]
+    points = [np.array([problem.task.arm.mounting.base_position]), _reference(problem)]
     if problem.obstacles is not None:
         points.append(np.array([shape.position for shape in problem.obstacles.shapes]))
     points += [evaluation.skeleton[_finite(evaluation)].reshape(-1, 3) for evaluation in evaluations]
     arm = problem.task.arm
-    floats = isinstance(arm, FloatingArm) and arm.floats
-    if isinstance(arm, FloatingArm) and floats:
+    floats = arm.base.kind == "floating"
+    if floats:
         points += [corners(arm, e.base)[_finite(e)].reshape(-1, 3) for e in evaluations]
     labels = [evaluation.label for evaluation in evaluations]
     revolute = problem.task.arm.description.turning.tolist()
@@ -216,7 +216,7 @@ def _send_motion(recording: Any, problem: Problem, evaluation: Evaluation) -> No
         poses = rr.LineStrips2D(list(flat[chosen]), colors=faded(label, 0.3), radii=pixels(0.8), draw_order=10.0)
         recording.log(f"{root}/poses", poses, static=True)
         arm = problem.task.arm
-        if isinstance(arm, FloatingArm) and arm.floats:
+        if arm.base.kind == "floating":
             edges = rr.LineStrips2D.columns(strips=list(_flat(outlines(arm, evaluation.base)[rows])))
             look = {"colors": rgba(label), "radii": pixels(1.5), "draw_order": 45.0}
             recording.log(f"{root}/spacecraft", rr.LineStrips2D.from_fields(**look), static=True)
@@ -258,7 +258,7 @@ def _send_arm(recording: Any, problem: Problem, evaluation: Evaluation, time: li
     poses = (evaluation.base.position[rows], evaluation.base.rotation[rows]) if moving else None
     arm, root = problem.task.arm, slug(evaluation.label)
     draw_arm(recording, arm, root, rgba(evaluation.label, SOLID), time, q, poses)
-    if isinstance(arm, FloatingArm) and moving and arm.spacecraft.mass > 0:
+    if moving and arm.base.spacecraft.mass > 0:
         _send_spacecraft(recording, arm, root, evaluation.label)
 
 
@@ -285,7 +285,7 @@ def send_obstacles(recording: Any, shapes: Sequence[Shape], planar: bool) -> Non
         recording.log(f"obstacles/{slug(shape.name)}", solid, static=True)
 
 
-def _send_spacecraft(recording: Any, arm: FloatingArm, root: str, label: str) -> None:
+def _send_spacecraft(recording: Any, arm: Arm, root: str, label: str) -> None:
     """The box that stands for the spacecraft, in the frame of the root link."""
     shape = box(arm)
     solid = rr.Boxes3D(

@@ -1,7 +1,7 @@
 """PMKE with limits, for any first-order or torque objective: a receding horizon on the planner's own lifted program.
 
 Every update interval the motion over the next h knots is optimised from the present position and velocity, within the
-position, velocity, torque and power limits and clear of the obstacles (`transcription.py`); its first knots are executed
+position, velocity, torque and power limits and clear of the obstacles (`program/`); its first knots are executed
 as they are, so that the executed motion keeps the limits at its knots. A few coarse knots carry the window on to the end
 of the path: a horizon alone runs into dead ends, where the limits leave no way on.
 Before anything moves
@@ -32,7 +32,7 @@ from pipeline.problem.problem import Boundary, Problem
 from pipeline.problem.solution import Solution, Status, Trajectory
 from pipeline.program import ipopt
 from pipeline.program.feasibility import least_violation
-from pipeline.program.program import Transcription
+from pipeline.program.transcription import transcribe
 
 TRACKING = 1e-6  # [m]
 
@@ -56,7 +56,7 @@ def solve_window(
     problem: Problem, times: Array, guess: Array, tolerance: float
 ) -> tuple[Array, float, ipopt.Outcome, int]:
     """The motion (h + 1, n) of least objective from problem.q_init and qd_init over the knots `times`; guess (h + 1, n)."""
-    program = Transcription(problem, times, guess)
+    program = transcribe(problem, times, guess)
     q, outcome, iterations = program.solve(tolerance=tolerance, max_iterations=MOST_ITERATIONS)
     return q, float(objective_values(problem, times, q[None])[0]), outcome, iterations
 
@@ -72,8 +72,8 @@ def rollout(problem: Problem, q: Array, targets: Array) -> Array:
 
 def path_weight(arm: Arm, q: Array) -> Array | None:
     """For `project` from q (K, n): least joint displacements, the base following them; None: it stands still."""
-    joints = arm.n - arm.base_coordinates
-    return arm.lift(q, np.tile(np.eye(joints), (len(q), 1, 1))) if arm.base_coordinates else None
+    joints = arm.n - arm.base.count
+    return arm.lift(q, np.tile(np.eye(joints), (len(q), 1, 1))) if arm.base.count else None
 
 
 def solve(problem: Problem, options: PmkeOptions) -> Solution:
