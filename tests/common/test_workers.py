@@ -11,6 +11,7 @@ import pandas as pd
 import pytest
 
 from pipeline.build.problem import prepare
+from pipeline.common import workers as workers_module
 from pipeline.common.workers import Workers
 from pipeline.config import run as config
 from pipeline.methods import global_planner
@@ -54,14 +55,16 @@ def test_without_a_store_nothing_is_kept(tmp_path: Path) -> None:
     assert calls(tmp_path) == [1.0, 1.0]
 
 
-@pytest.mark.parametrize("change", ["function", "context", "item", "store"])
-def test_other_work_is_done_again(tmp_path: Path, change: str) -> None:
+@pytest.mark.parametrize("change", ["function", "context", "item", "store", "versions"])
+def test_other_work_is_done_again(tmp_path: Path, change: str, monkeypatch: pytest.MonkeyPatch) -> None:
     context = Context(tmp_path)
     Workers(1, tmp_path / "store").map(multiply, context, [1.0])
     function = fail_at_three if change == "function" else multiply
     context = Context(tmp_path, 2.0) if change == "context" else context
     item = 1.0 + 1e-15 if change == "item" else 1.0
     store = tmp_path / ("other" if change == "store" else "store")
+    if change == "versions":
+        monkeypatch.setattr(workers_module, "stamp", lambda: "selfmotion 99")
     assert Workers(1, store).map(function, context, [item]) == [context.factor * item]
     assert len(calls(tmp_path)) == 2
 
