@@ -116,7 +116,7 @@ def check(problem: Problem) -> None:
     supported = "supported are r = 1, an objective of first order, boundary free or fixed, and no limits or obstacles"
     if problem.task.redundancy != 1:
         raise InputError(f"calculus_of_variations: the redundancy degree is {problem.task.redundancy}; {supported}")
-    if problem.objective.torque or not Lagrangian(problem.task, problem.objective).is_quadratic:
+    if problem.objective.second_order or not Lagrangian(problem.task, problem.objective).is_quadratic:
         raise InputError(f"calculus_of_variations: the objective holds a torque integral; {supported}")
     if problem.boundary is Boundary.CYCLIC:
         raise InputError(f"calculus_of_variations: the boundary is cyclic; {supported}")

@@ -68,7 +68,7 @@ def check(problem: Problem) -> None:
     """Refuse problems that this method does not serve; raises InputError."""
     if problem.task.redundancy != 1:
         raise InputError(f"dynamic_programming: the redundancy degree is {problem.task.redundancy}; supported is r = 1")
-    if problem.objective.torque or not Lagrangian(problem.task, problem.objective).is_quadratic:
+    if problem.objective.second_order or not Lagrangian(problem.task, problem.objective).is_quadratic:
         raise InputError(
             "dynamic_programming needs an objective of first order, such as the kinetic energy; a torque integral is not one"
         )

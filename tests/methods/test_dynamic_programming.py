@@ -130,6 +130,6 @@ def test_minima_wrap_around_each_loop() -> None:
 
 def test_unsupported(line: Problem) -> None:
     with pytest.raises(InputError, match="first order"):
-        solve(replace(line, objective=Objective(0.0, 1.0)), DynamicProgrammingOptions())
+        solve(replace(line, objective=Objective({"torque": 1.0})), DynamicProgrammingOptions())
     with pytest.raises(InputError, match="does not end where it starts"):
         solve(replace(line, boundary=Boundary.CYCLIC), DynamicProgrammingOptions())

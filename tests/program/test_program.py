@@ -28,11 +28,11 @@ Guess = Callable[[Problem], Array]
 LIMITS = Limits(-2 * np.ones(3), 2 * np.ones(3), np.full(3, 3.8), np.full(3, 0.4), np.array([0.7, 0.7, np.inf]))
 KINDS: dict[str, dict[str, Any]] = {
     "kinetic energy": {},
-    "torque": {"objective": Objective(0.0, 1.0)},
-    "both, limits": {"objective": Objective(1.0, 0.3), "limits": LIMITS},
-    "torque, limits, cyclic": {"objective": Objective(0.0, 1.0), "limits": LIMITS, "boundary": Boundary.CYCLIC},
+    "torque": {"objective": Objective({"torque": 1.0})},
+    "both, limits": {"objective": Objective({"kinetic_energy": 1.0, "torque": 0.3}), "limits": LIMITS},
+    "torque, limits, cyclic": {"objective": Objective({"torque": 1.0}), "limits": LIMITS, "boundary": Boundary.CYCLIC},
     "kinetic energy, free": {"boundary": Boundary.FREE},
-    "at speed": {"objective": Objective(0.5, 0.5), "timing": ConstantSpeed(10.0)},
+    "at speed": {"objective": Objective({"kinetic_energy": 0.5, "torque": 0.5}), "timing": ConstantSpeed(10.0)},
 }
 
 

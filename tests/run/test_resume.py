@@ -11,19 +11,21 @@ import pandas as pd
 import pytest
 from joblib import Parallel, cpu_count, delayed, parallel_config
 
-from pipeline.artifacts.figures import motions as figures
-from pipeline.artifacts.recording import recording
 from pipeline.common import versions
 from pipeline.common.workers import Workers
 from pipeline.config.run import RunConfig
 from pipeline.problem.problem import Problem
 from pipeline.run import run as run_module
 from tests.killed import run_and_kill
+from tests.reports import leave_out_pictures
 from tests.run.test_main import Answer, call, command
 from tests.tasks import kept
 
 Sweep = Callable[..., Answer]
-LSV = ("-m", "name=traj1", "methods=[lsv]", "timing.steps=10", "path=line", "hydra.sweep.dir=all")
+LSV = (
+    *("-m", "name=traj1", "methods=[lsv]", "timing.steps=10", "method.lsv.dt=0.05", "path=line"),
+    "hydra.sweep.dir=all",
+)
 
 
 @pytest.fixture(scope="module")
@@ -31,22 +33,16 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of a sweep over two lengths. Tests go on in a copy of it."""
     folder = tmp_path_factory.mktemp("finished")
     with pytest.MonkeyPatch.context() as patch:
-        without_pictures(patch)
+        leave_out_pictures(patch)
         patch.chdir(folder)
         assert call(patch, None, *LSV, "path.length=0.1,0.15").code == 0
     return folder / "all"
 
 
-def without_pictures(patch: pytest.MonkeyPatch) -> None:
-    """They take most of the time."""
-    for module in (figures, recording):
-        patch.setattr(module, "write", lambda *_, **__: None)
-
-
 @pytest.fixture
 def sweep(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Sweep:
     """A sweep into the folder `all`, within this process."""
-    without_pictures(monkeypatch)
+    leave_out_pictures(monkeypatch)
     monkeypatch.chdir(tmp_path)
     return partial(call, monkeypatch, capfd, *LSV)
 

@@ -16,6 +16,7 @@ from hydra import compose, initialize_config_dir
 
 from pipeline.artifacts.recording.blueprint import slug
 from pipeline.artifacts.recording.recording import read_series
+from pipeline.build.problem import prepare
 from pipeline.common.errors import ConfigError, PathError, RobotError
 from pipeline.common.workers import Workers
 from pipeline.config import run as schema
@@ -26,7 +27,7 @@ from pipeline.methods import global_planner, lsv
 from pipeline.methods.pmke import predictive as pmke
 from pipeline.problem.problem import Boundary, Problem
 from pipeline.problem.solution import Status, no_progress
-from pipeline.run import run
+from pipeline.run.solve import solve
 from tests.run.test_main import ROOT, Answer, call, command
 from tests.support import RUN_FILES
 
@@ -40,7 +41,7 @@ def configured(*words: str) -> schema.RunConfig:
 
 
 def prepared(*words: str) -> Problem:
-    return run.prepare(configured(*words))
+    return prepare(configured(*words))
 
 
 def strict_json(text: str) -> dict[str, Any]:
@@ -158,9 +159,9 @@ class TestTraj3:
 @functools.cache
 def solved(number: int, method: str) -> tuple[Problem, list[Evaluation]]:
     config = configured(f"+experiment=traj{number}", f"methods=[{method}]", *FEW)
-    problem = run.prepare(config)
-    ((solutions, seconds),) = run.solve(problem, config, Workers(min(2, os.cpu_count() or 1)), no_progress)
-    assert seconds > 0
+    problem = prepare(config)
+    solutions, seconds = solve(problem, config, Workers(min(2, os.cpu_count() or 1)), no_progress)
+    assert seconds[method] > 0
     return problem, [evaluate(problem, solution) for solution in solutions]
 
 
@@ -266,7 +267,7 @@ ROWS = np.array([[0.45, 0.02], [0.40, 0.06], [0.36, 0.05], [0.33, 0.10]])
 @pytest.mark.parametrize("relative", [False, True])
 def test_way_points(points: Callable[[Any], Path], relative: bool) -> None:
     config = configured("path=waypoints", f"path.file={points(ROWS)}", f"path.relative={str(relative).lower()}")
-    problem = run.prepare(config)
+    problem = prepare(config)
     here = prepared().task.value(np.array([config.robot.q_init]))[0]
     shift = here - ROWS[0] if relative else 0.0
     start = problem.task.value(problem.q_init[None])[0]
@@ -349,7 +350,7 @@ def test_a_value_given_overrides_the_description() -> None:
 def test_boundaries_and_objectives_arrive() -> None:
     problem = prepared("path=circle", "boundary=cyclic", "objective=weighted")
     assert problem.boundary is Boundary.CYCLIC
-    assert (problem.objective.kinetic_energy, problem.objective.torque) == (0.5, 0.5)
+    assert problem.objective.weights == {"kinetic_energy": 0.5, "torque": 0.5}
     gap = problem.reference.position(np.array([0.0, problem.reference.duration]))
     np.testing.assert_allclose(gap[0], gap[1], atol=1e-12)
 
@@ -373,4 +374,4 @@ def test_both_models_of_the_arm() -> None:
 )
 def test_python_callers_get_the_same_errors(values: dict[str, Any], error: type[Exception], named: str) -> None:
     with pytest.raises(error, match=named):
-        run.prepare(schema.check(values))
+        prepare(schema.check(values))

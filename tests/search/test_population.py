@@ -83,7 +83,7 @@ def test_a_stretched_start_does_not_end_the_run(task: PositionTask) -> None:
 
 def test_costs_are_backward_sums(problem: Make, peer: SimpleNamespace, rng: np.random.Generator) -> None:
     times, motions = np.array([0.0, 0.1, 0.3, 0.35]), rng.normal(size=(5, 4, 3))
-    asked = replace(problem(1, 3), objective=Objective(2.0, 0.1))
+    asked = replace(problem(1, 3), objective=Objective({"kinetic_energy": 2.0, "torque": 0.1}))
     dt = np.diff(times)
     for motion, value in zip(motions, objective_values(asked, times, motions), strict=True):
         qd = np.diff(motion, axis=0) / dt[:, None]
@@ -91,7 +91,7 @@ def test_costs_are_backward_sums(problem: Make, peer: SimpleNamespace, rng: np.r
         energy, torque = peer.energy(motion[1:], qd) @ dt, (peer.torque(motion[1:], qd, qdd) ** 2).sum(axis=1) @ dt
         assert value == pytest.approx(2.0 * energy + 0.1 * torque, rel=1e-9)
         both = integrals(asked, times, motion)
-        assert (both.kinetic_energy, both.torque) == pytest.approx((energy, torque), rel=1e-9)
+        assert (both.integrals["kinetic_energy"], both.integrals["torque"]) == pytest.approx((energy, torque), rel=1e-9)
 
 
 @given(st.floats(-3, 3), st.lists(st.integers(-3, 3), min_size=2, max_size=2))

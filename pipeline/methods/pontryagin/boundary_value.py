@@ -62,7 +62,7 @@ def check(problem: Problem) -> None:
     supported = (
         "supported are objectives of first order, boundary free or fixed, positions only, and no limits or obstacles"
     )
-    if problem.objective.torque or not Lagrangian(problem.task, problem.objective).is_quadratic:
+    if problem.objective.second_order or not Lagrangian(problem.task, problem.objective).is_quadratic:
         raise InputError(f"pontryagin: the objective holds a torque integral; {supported}")
     if problem.boundary is Boundary.CYCLIC:
         raise InputError(f"pontryagin: the boundary is cyclic; {supported}")
