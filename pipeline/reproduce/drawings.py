@@ -17,7 +17,7 @@ from pipeline.artifacts.figures import identification as identification_figure
 from pipeline.artifacts.figures.panels import EVENT, INK
 from pipeline.artifacts.figures.stroboscopic import stroboscopic
 from pipeline.common.arrays import Array
-from pipeline.config import documents
+from pipeline.config.found import PowerLaw
 from pipeline.evaluation.evaluation import Evaluation
 from pipeline.reproduce.recompute import recompute
 from pipeline.reproduce.results import Results
@@ -123,7 +123,7 @@ def candidate_study(runs: Sequence[Results], labels: Sequence[str], title: str) 
     (run,) = runs
     curve, problem = run.table("candidate_study"), run.problem
     intercept, exponent = (
-        recompute(documents.PowerLaw(run.name, parameter), {run.name: run}) for parameter in ("intercept", "exponent")
+        recompute(PowerLaw(run.name, parameter), {run.name: run}) for parameter in ("intercept", "exponent")
     )
     parameters = len(problem.times) * problem.task.arm.n
     study = Study(curve["candidates"].to_numpy(), curve["distance"].to_numpy(), parameters, intercept, exponent)

@@ -72,7 +72,8 @@ def test_printed_values_stand_beside_the_first_optimum_of_their_method(summary: 
 @pytest.mark.parametrize("file", EXPERIMENTS, ids=lambda file: file.stem)
 def test_every_printed_number_has_a_column_to_compare_it_with(file: Path, summary: pd.DataFrame) -> None:
     """A misspelt column would silently compare nothing."""
-    for method, values in printed_for(file.stem).values.items():
+    printed = printed_for(file.stem)
+    for method, values in printed.values.items():
         assert set(values) <= set(summary.columns), method
 
 
