@@ -161,7 +161,7 @@ def half_width(printed: str) -> float:
 class Printed:
     """What a document prints of an experiment: {method: {column of summary.csv: number}}, its name and a note."""
 
-    values: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    numbers: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     document: str = ""
     note: str = ""
 

@@ -31,7 +31,8 @@ def job(values: DictConfig) -> int:
     """One run, alone or within a sweep. A run of a sweep never raises, so that the others go on."""
     from pipeline.artifacts import sweep
     from pipeline.config.compose import checked
-    from pipeline.run import resume, run
+    from pipeline.run import resume
+    from pipeline.run.run import run
 
     hydra_values = HydraConfig.get()
     folder, sweeping = Path(hydra_values.runtime.output_dir), hydra_values.mode is RunMode.MULTIRUN
@@ -43,7 +44,7 @@ def job(values: DictConfig) -> int:
             return done
         if sweeping:
             resume.forget(folder)
-        code = run.run_and_write(config, folder)
+        code = run(config, folder)
     except InputError as error:
         print(f"error: {error}", file=sys.stderr)
         sweep.write_failure(folder, str(error))

@@ -38,11 +38,11 @@ class Session(Callback):
             raise SystemExit(2) from None
 
     def check(self, asked: RunConfig) -> None:
-        """Raise InputError if the job cannot be done."""
+        """Raise InputError if the job cannot be done. The problem that is built for this is kept for the run."""
         from pipeline.common.workers import Workers
-        from pipeline.run.solve import state
+        from pipeline.run.state import keep
 
-        state(asked)
+        keep(asked)
         Workers(address=asked.parallel.address).check()
 
     def on_multirun_start(self, config: DictConfig, **_: Any) -> None:

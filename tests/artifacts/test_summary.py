@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,14 +10,14 @@ import pytest
 
 from pipeline.artifacts import summary as tables
 from pipeline.artifacts import sweep
-from pipeline.artifacts.markdown import markdown
+from pipeline.artifacts.report import Report
 from pipeline.common.arrays import Array
 from pipeline.config.documents import Printed, printed_for
 from pipeline.config.run import RunConfig
 from pipeline.evaluation.evaluation import Evaluation, evaluate
 from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Solution, Status, Trajectory
-from pipeline.studies.studies import Extras
+from tests.reports import report_of
 from tests.support import ROOT
 
 Make = Callable[[int, int], Problem]
@@ -41,8 +42,16 @@ def motions(asked: Problem, guess: Callable[[Problem], Array]) -> list[Evaluatio
 
 
 @pytest.fixture
-def summary(asked: Problem, motions: list[Evaluation]) -> pd.DataFrame:
-    return tables.summary(asked, motions, {"lsv": 0.5, "global": 2.5}, PRINTED)
+def report(asked: Problem, motions: list[Evaluation], monkeypatch: pytest.MonkeyPatch) -> Report:
+    """Of the experiment `mine`, of which a paper prints two numbers."""
+    monkeypatch.setattr(tables, "printed_for", {"mine": PRINTED}.get)
+    made = report_of(asked, motions, settings=RunConfig(name="mine"))
+    return replace(made, seconds={"lsv": 0.5, "global": 2.5})
+
+
+@pytest.fixture
+def summary(report: Report) -> pd.DataFrame:
+    return tables.summary(report)
 
 
 def test_summary_is_one_row_per_motion(motions: list[Evaluation], summary: pd.DataFrame) -> None:
@@ -73,12 +82,14 @@ def test_printed_values_stand_beside_the_first_optimum_of_their_method(summary: 
 def test_every_printed_number_has_a_column_to_compare_it_with(file: Path, summary: pd.DataFrame) -> None:
     """A misspelt column would silently compare nothing."""
     printed = printed_for(file.stem)
-    for method, values in printed.values.items():
+    for method, values in printed.numbers.items():
         assert set(values) <= set(summary.columns), method
 
 
-def test_trajectories_read_back_as_they_are(tmp_path: Path, motions: list[Evaluation], summary: pd.DataFrame) -> None:
-    tables.write(tmp_path, motions, summary, "text", Extras())
+def test_trajectories_read_back_as_they_are(
+    tmp_path: Path, motions: list[Evaluation], report: Report, summary: pd.DataFrame
+) -> None:
+    tables.write(report, tmp_path)
     read = pd.read_parquet(tmp_path / "trajectories.parquet")
     kinds = [f"{name}_{j}" for name in ("q", "qd", "qdd", "tau") for j in (1, 2, 3)]
     assert list(read.columns) == ["method", "optimum", "time", *kinds, "x", "y", "z"]
@@ -89,7 +100,7 @@ def test_trajectories_read_back_as_they_are(tmp_path: Path, motions: list[Evalua
         np.testing.assert_array_equal(part["time"], motion.time)
     own, back = (part.astype(object).fillna("") for part in (summary, pd.read_csv(tmp_path / "summary.csv")))
     pd.testing.assert_frame_equal(back, own, check_dtype=False)
-    assert (tmp_path / "summary.md").read_text(encoding="utf-8") == "text"
+    assert (tmp_path / "summary.md").read_text(encoding="utf-8") == tables.text(report)
     assert sorted(file.name for file in tmp_path.iterdir()) == ["summary.csv", "summary.md", "trajectories.parquet"]
 
 
@@ -97,8 +108,8 @@ def table_rows(text: str) -> list[list[str]]:
     return [[cell.strip() for cell in line.strip("|").split("|")] for line in text.splitlines() if line.startswith("|")]
 
 
-def test_summary_for_people(asked: Problem, motions: list[Evaluation], summary: pd.DataFrame) -> None:
-    text = markdown(RunConfig(name="mine"), asked, motions, summary, Extras(), PRINTED)
+def test_summary_for_people(motions: list[Evaluation], report: Report) -> None:
+    text = tables.text(report)
     rows = table_rows(text)
     assert rows[0] == ["", "lsv", "global", "global 2"]
     assert {len(row) for row in rows} == {4}
@@ -153,11 +164,9 @@ def test_a_sweep_without_any_summary_writes_nothing(tmp_path: Path) -> None:
     assert [file.name for file in tmp_path.iterdir()] == ["0_run"]
 
 
-def test_a_printed_zero_or_an_unknown_column_is_no_crash(asked: Problem, motions: list[Evaluation]) -> None:
+def test_a_printed_zero_or_an_unknown_column_is_no_crash(report: Report, monkeypatch: pytest.MonkeyPatch) -> None:
     values = {"lsv": {"torque_integral": 0.0, "nonsense": 1.0}}
-    published = Printed(values)
+    monkeypatch.setattr(tables, "printed_for", {"mine": Printed(values)}.get)
     with np.errstate(divide="ignore"):
-        table = tables.summary(asked, motions, {"lsv": 0.5, "global": 2.5}, published)
-    assert np.isnan(table["difference_nonsense"][0])
-    text = markdown(RunConfig(), asked, motions, table, Extras(), published)
-    assert "printed 0" in text
+        assert np.isnan(tables.summary(report)["difference_nonsense"][0])
+        assert "printed 0" in tables.text(report)

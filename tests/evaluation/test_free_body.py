@@ -18,7 +18,7 @@ from pipeline.methods.method import Context
 from pipeline.methods.pmke.predictive import pmke
 from pipeline.methods.registry import METHODS
 from pipeline.problem.costs import integrals
-from pipeline.problem.objective import IntegralBounds, Objective
+from pipeline.problem.objective import Objective
 from pipeline.problem.problem import Boundary, Problem
 from pipeline.problem.solution import Solution, Status, Trajectory
 from pipeline.program.feasibility import least_violation, violations
@@ -191,7 +191,7 @@ def test_a_cycle_with_torques() -> None:
     assert e.status is Status.SOLVED, e.message
     assert np.abs(e.q[-1] - e.q[0]).max() < 1e-9
     costs = integrals(problem, problem.times, e.solution.trajectory.q)
-    assert e.torque_integral[-1] == pytest.approx(costs.torque, rel=1e-6)
+    assert e.torque_integral[-1] == pytest.approx(costs.integrals["torque"], rel=1e-6)
     energy = solved(*ON_BASE, *CIRCLE)[1]
     assert e.torque_integral[-1] < energy.torque_integral[-1]
 
@@ -261,8 +261,8 @@ def test_least_reaction_on_a_held_base() -> None:
     assert e.status is Status.SOLVED, e.message
     assert e.objective == pytest.approx(0.1 * e.integral("reaction_force") + e.integral("reaction_torque"))
     costs = integrals(problem, problem.times, e.solution.trajectory.q)
-    assert e.integral("reaction_force") == pytest.approx(costs.reaction_force, rel=1e-6)
-    assert e.integral("reaction_torque") == pytest.approx(costs.reaction_torque, rel=1e-6)
+    assert e.integral("reaction_force") == pytest.approx(costs.integrals["reaction_force"], rel=1e-6)
+    assert e.integral("reaction_torque") == pytest.approx(costs.integrals["reaction_torque"], rel=1e-6)
     assert e.objective < 0.8 * (0.1 * energy.integral("reaction_force") + energy.integral("reaction_torque"))
     # The same joints on the plain fixed base: the same energies and torques.
     again = evaluate(plain, Solution("x", Trajectory(e.time, e.q), Status.SOLVED))
@@ -282,14 +282,17 @@ def test_least_turning_brings_the_base_to_rest() -> None:
 
 # --- the program ------------------------------------------------------------------------------------------------------
 
+MIXED = Objective({"kinetic_energy": 0.5, "torque": 0.3, "base_rotation": 0.2})
+
+
 PROGRAMS = {
     "planar, all limits": (
         ("robot=planar3r_base", "base=free", "limits=joint_torque_power", "limits.attitude=0.3"),
-        {"objective": Objective(0.5, 0.3, base_rotation=0.2), "integral_bounds": IntegralBounds(1.0, 1.0, 0.5)},
+        {"objective": MIXED, "bounds_of_integrals": {"kinetic_energy": 1.0, "torque": 1.0, "base_rotation": 0.5}},
     ),
     "planar, cycle, momentum": (
         ("robot=planar3r_base", "base=free", "base.linear_momentum=[0.1,0.2,0]", *CIRCLE, "limits=joint_torque_power"),
-        {"objective": Objective(0.0, 1.0)},
+        {"objective": Objective({"torque": 1.0})},
     ),
     "panda, all limits": (
         (
@@ -303,13 +306,13 @@ PROGRAMS = {
             ),
             *("limits=joint_torque_power", "base.angular_momentum=[0.1,0,0.2]", "robot.orientation=pointing"),
         ),
-        {"objective": Objective(0.5, 0.3, base_rotation=0.2), "integral_bounds": IntegralBounds(base_rotation=0.5)},
+        {"objective": MIXED, "bounds_of_integrals": {"base_rotation": 0.5, "velocity_norm": 3.0}},
     ),
     "panda, held": (
         ("robot=panda", "objective=reaction", "path.direction=[0,1,0]", "limits=joint_torque_power"),
         {
-            "objective": Objective(0.0, reaction_force=0.4, reaction_torque=0.6),
-            "integral_bounds": IntegralBounds(reaction_torque=2.0, torque=3.0),
+            "objective": Objective({"reaction_force": 0.4, "reaction_torque": 0.6}),
+            "bounds_of_integrals": {"reaction_torque": 2.0, "torque": 3.0},
         },
     ),
 }

@@ -17,8 +17,6 @@ import pytest
 from hydra.core.global_hydra import GlobalHydra
 from PIL import Image
 
-from pipeline.artifacts.figures import motions as figures
-from pipeline.artifacts.recording import recording
 from pipeline.common.errors import ConfigError
 from pipeline.config import documents
 from pipeline.config.documents import half_width
@@ -32,6 +30,7 @@ from pipeline.reproduce.results import ResultError, Results
 from pipeline.reproduce.table import COLUMNS, command, compare, counts, judge
 from pipeline.reproduce.verdict import verdict
 from pipeline.run import session
+from tests.reports import leave_out_pictures
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 WORDS = {"b": "better", "m": "misprint", "d": "differs"}
@@ -326,8 +325,7 @@ def reproduce_here(
     """`python -m pipeline.reproduce --folder here ...` within this process."""
     monkeypatch.setenv("HYDRA_FULL_ERROR", "0")
     monkeypatch.chdir(tmp_path)
-    for module in (figures, recording):
-        monkeypatch.setattr(module, "write", lambda *_, **__: None)
+    leave_out_pictures(monkeypatch)
 
     def run(*words: str) -> tuple[int, str, str]:
         monkeypatch.setattr(session, "exit_code", 0)

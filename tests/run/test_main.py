@@ -235,7 +235,7 @@ def test_an_objective_is_what_it_is_called(kind: str) -> None:
     with initialize_config_dir(CONF, version_base="1.3"):
         config = checked(compose("config", overrides=[f"objective.kind={kind}"]))
     assert config.objective.kind == kind
-    assert prepare(config).objective == Objective(**{"kinetic_energy": 0.0, "torque": 0.0, kind: 1.0})
+    assert prepare(config).objective == Objective({kind: 1.0})
 
 
 URDF = """<robot name="bad">
