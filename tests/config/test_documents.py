@@ -50,7 +50,7 @@ def test_what_a_document_says_of_runs_is_of_experiments_that_exist(name: str) ->
     document = read(name)
     assert set(document.runs) <= set(EXPERIMENTS)
     assert set(document.experiments) <= set(EXPERIMENTS)
-    assert all(mention.same_as in ("", *EXPERIMENTS) for mention in document.runs.numbers())
+    assert all(mention.same_as in ("", *EXPERIMENTS) for mention in document.runs.values())
 
 
 @pytest.mark.parametrize("experiment", EXPERIMENTS)
