@@ -137,7 +137,10 @@ def reproduced(tmp_path_factory: pytest.TempPathFactory) -> Path:
     from tests.reports import leave_out_pictures
 
     folder = tmp_path_factory.mktemp("reproduced")
-    few = ("method.global.candidates=300", "method.global.optimised=16", "candidate_study.repeats=4")
+    few = (
+        *(f"method.global.{key}" for key in ("configurations=12", "candidates=150", "optimised=12")),
+        *(f"candidate_study.{key}" for key in ("most=2000", "repeats=2")),
+    )
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("HYDRA_FULL_ERROR", "0")  # the command line sets it; this puts it back
         patch.setattr(session, "exit_code", 0)
