@@ -59,7 +59,7 @@ def test_torque_as_the_objective_of_the_predictions_costs_less_torque() -> None:
     assert interpolated.status is Status.SOLVED
     by_energy = evaluate(asked, pmke.solve(asked, WINDOW))
     by_torque = evaluate(asked, pmke.solve(asked, replace(WINDOW, objective="torque")))
-    best = evaluate(asked, global_planner.solve(replace(asked, objective=Objective({"torque": 1.0})))[0])
+    best = evaluate(asked, global_planner.solve(replace(asked, objective=Objective({"torque": 1.0})), FEW)[0])
     assert by_torque.status is by_energy.status is Status.SOLVED
     assert best.torque_integral[-1] * 0.9 < by_torque.torque_integral[-1] < 0.8 * by_energy.torque_integral[-1]
     assert by_torque.energy_integral[-1] > by_energy.energy_integral[-1]
