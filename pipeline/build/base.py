@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from pipeline.build.regular import require_regular
 from pipeline.common.arrays import Array
 from pipeline.common.errors import ConfigError
 from pipeline.config.robot import FreeBaseConfig
@@ -18,13 +19,13 @@ from pipeline.problem.integrals import INTEGRALS
 from pipeline.problem.limits import Limits
 from pipeline.problem.problem import Problem
 from pipeline.robot.spacecraft import Spacecraft
-from pipeline.robot.urdf import root_mass
+from pipeline.robot.urdf import check_root, root_mass
 
 
 def place(problem: Problem, config: RunConfig) -> Problem:
     """The problem on the base that `config` asks for; raises ConfigError if they do not go together."""
     wanted = {key for key, weight in config.objective.weights.items() if weight}
-    wanted |= set(config.pareto.objectives) if "pareto" in config.methods else set()
+    wanted |= set(config.method.pareto.objectives) if "pareto" in config.methods else set()
     bases = {INTEGRALS[name].base for name in wanted}
     free = isinstance(config.base, FreeBaseConfig)
     if "floating" in bases and not free:
@@ -42,6 +43,8 @@ def place(problem: Problem, config: RunConfig) -> Problem:
         base = Held(pose_coordinates(arm, Held.spacecraft))
     else:
         return problem
+    if config.closed_loop.run:
+        raise ConfigError("closed_loop.run: the controller is one for arms on a fixed base")
     if problem.objective.secondary is not None:
         raise ConfigError("objective.secondary: secondary criteria are for arms on a fixed base")
     if np.any(arm.mounting.gravity) and free:
@@ -60,6 +63,8 @@ def _moved(problem: Problem, base: Base) -> Problem:
     """The same task, path and limits, with the base's coordinates before the joints: no limits but on its attitude."""
     fixed = problem.task.arm
     arm = Arm(fixed.description, fixed.mounting, base)
+    if base.kind == "floating":
+        require_regular(arm)
     free = np.full(base.count, np.inf)
 
     def padded(values: Array, sign: float = 1.0) -> Array:
@@ -79,6 +84,7 @@ def _moved(problem: Problem, base: Base) -> Problem:
 
 
 def _spacecraft(base: FreeBaseConfig, arm: Arm) -> Spacecraft:
+    check_root(arm.description)
     momentum = (*base.linear_momentum, *base.angular_momentum)
     if base.mass is None:
         if root_mass(arm.description) <= 0:

@@ -14,7 +14,8 @@ from pipeline.build.problem import prepare
 from pipeline.common import workers as workers_module
 from pipeline.common.workers import Workers
 from pipeline.config import run as config
-from pipeline.methods import global_planner
+from pipeline.methods import method
+from pipeline.methods.global_planner.planner import global_planner
 from pipeline.run.run import UNFINISHED
 from tests.killed import run_and_kill
 from tests.run.test_main import call
@@ -141,7 +142,9 @@ def test_the_planner_gives_the_same_with_one_worker_and_two(tmp_path: Path, stor
     asked = config.check(SIM1)
     problem = prepare(asked)
     solved = [
-        global_planner.solve(problem, asked.method.global_, 1, Workers(count, tmp_path / str(count) if store else None))
+        global_planner(
+            problem, asked.method.global_, method.Context(1, Workers(count, tmp_path / str(count) if store else None))
+        )
         for count in (1, 2)
     ]
     assert len(solved[0]) == len(solved[1])
@@ -154,11 +157,11 @@ def test_the_planner_starts_from_what_is_kept(tmp_path: Path) -> None:
     """Also from another process's files: keys do not depend on what this one has done with its objects."""
     asked = config.check(SIM1)
     workers = Workers(1, tmp_path)
-    first = global_planner.solve(prepare(asked), asked.method.global_, 1, workers)
+    first = global_planner(prepare(asked), asked.method.global_, method.Context(1, workers))
     kept = {file: file.stat().st_mtime_ns for file in tmp_path.iterdir()}
     problem = prepare(asked)
     problem.task.arm.mass_matrix(np.zeros((20, 3)))  # has built its plants
-    second = global_planner.solve(problem, asked.method.global_, 1, workers)
+    second = global_planner(problem, asked.method.global_, method.Context(1, workers))
     assert {file: file.stat().st_mtime_ns for file in tmp_path.iterdir()} == kept
     np.testing.assert_array_equal(first[0].trajectory.q, second[0].trajectory.q)
 
@@ -185,7 +188,7 @@ def test_a_killed_run_goes_on(
     # The same as without the interruption.
     options = {"configurations": 8, "candidates": 100, "optimised": 10}
     undisturbed = config.check({**SIM1, "method": {"global": options}})
-    whole = global_planner.solve(prepare(undisturbed), undisturbed.method.global_, 1)
+    whole = global_planner(prepare(undisturbed), undisturbed.method.global_)
     motions = pd.read_parquet(killed / "trajectories.parquet").groupby("optimum")
     assert len(motions) == len(whole)
     for (_, part), solution in zip(motions, whole, strict=True):

@@ -9,7 +9,7 @@ import pytest
 from pipeline.build.problem import prepare
 from pipeline.common.errors import ConfigError
 from pipeline.evaluation.evaluation import evaluate
-from pipeline.methods import global_planner
+from pipeline.methods.global_planner.planner import global_planner
 from pipeline.model.clearance import Clearance
 from pipeline.model.obstacles import Obstacles
 from pipeline.problem.problem import Problem
@@ -70,14 +70,14 @@ def line(margin: float, **changes: str) -> Problem:
 @cache
 def through_the_ball() -> tuple[Problem, Solution]:
     free = replace(line(0.03), obstacles=None)
-    return free, global_planner.solve(free, FEW)[0]
+    return free, global_planner(free, FEW)[0]
 
 
 @pytest.mark.slow
 def test_the_planner_keeps_its_clearance_between_knots_too() -> None:
     there, free, without = line(0.03), *through_the_ball()
     assert evaluate(there, without).clearance_between < 0.02, "the ball is not in the way: the test shows nothing"
-    best = evaluate(there, global_planner.solve(there, FEW)[0])
+    best = evaluate(there, global_planner(there, FEW)[0])
     assert best.status is Status.SOLVED
     assert best.clearance.min() >= 0.03 - 1e-9
     assert best.clearance_between >= 0.03 - 1e-9
@@ -115,7 +115,7 @@ def test_an_obstacle_on_the_path_is_named() -> None:
         "+obstacles.shapes.wall={kind: box, center: [0.563, 0.24, 0.0], size: [0.04, 0.04, 0.1]}",
         "obstacles.margin=0.01",
     )
-    solution = global_planner.solve(prepare(blocked), blocked.method.global_)[0]
+    solution = global_planner(prepare(blocked), blocked.method.global_)[0]
     assert not solution.found
     assert "clearance limit of link" in solution.message
     assert "from wall (0.01 m) cannot be met" in solution.message

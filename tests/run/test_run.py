@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import json
-import os
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -19,15 +18,16 @@ from pipeline.artifacts.recording.blueprint import slug
 from pipeline.artifacts.recording.recording import read_series
 from pipeline.build.problem import prepare
 from pipeline.common.errors import ConfigError, PathError, RobotError
-from pipeline.common.workers import Workers
 from pipeline.config import run as schema
 from pipeline.config.compose import checked
 from pipeline.config.methods import LsvOptions
 from pipeline.evaluation.evaluation import Evaluation, evaluate
-from pipeline.methods import global_planner, lsv
-from pipeline.methods.pmke import predictive as pmke
+from pipeline.methods.global_planner.planner import global_planner
+from pipeline.methods.lsv import lsv
+from pipeline.methods.method import Context
+from pipeline.methods.pmke.predictive import pmke
 from pipeline.problem.problem import Boundary, Problem
-from pipeline.problem.solution import Status, no_progress
+from pipeline.problem.solution import Status
 from pipeline.run.solve import solve
 from tests.run.test_main import ROOT, Answer, call, command
 from tests.support import FEW, FEW_STARTS, RUN_FILES
@@ -59,7 +59,14 @@ def strict_json(text: str) -> dict[str, Any]:
 @pytest.fixture(scope="module")
 def traj3(tmp_path_factory: pytest.TempPathFactory) -> tuple[Answer, Path]:
     folder = tmp_path_factory.mktemp("traj3")
-    answer = command("+experiment=traj3", "seed=7", *FEW_STARTS, f"hydra.run.dir={folder}/results", folder=folder)
+    answer = command(
+        "+experiment=traj3",
+        "seed=7",
+        *FEW_STARTS,
+        "parallel.workers=1",
+        f"hydra.run.dir={folder}/results",
+        folder=folder,
+    )
     return answer, folder / "results"
 
 
@@ -160,7 +167,7 @@ class TestTraj3:
 def solved(number: int, method: str) -> tuple[Problem, list[Evaluation]]:
     config = configured(f"+experiment=traj{number}", f"methods=[{method}]", *FEW_STARTS)
     problem = prepare(config)
-    solutions, seconds = solve(problem, config, Workers(min(2, os.cpu_count() or 1)), no_progress)
+    solutions, seconds = solve(problem, config, Context())
     assert seconds[method] > 0
     return problem, [evaluate(problem, solution) for solution in solutions]
 
@@ -279,8 +286,8 @@ def test_way_points(points: Callable[[Any], Path], relative: bool) -> None:
         assert np.linalg.norm(dense - point, axis=1).min() < 1e-4
     if relative:
         np.testing.assert_allclose(problem.q_init, config.robot.q_init, atol=1e-9)
-    solutions = [lsv.solve(problem, LsvOptions(dt=0.05)), pmke.solve(problem)]
-    solutions += global_planner.solve(problem, replace(FEW, optimised=3))
+    solutions = [lsv(problem, LsvOptions(dt=0.05))[0], pmke(problem)[0]]
+    solutions += global_planner(problem, replace(FEW, optimised=3))
     assert all(evaluate(problem, solution).status is Status.SOLVED for solution in solutions)
 
 
@@ -295,14 +302,14 @@ def test_a_path_can_say_where_it_starts() -> None:
     np.testing.assert_allclose(moved, [0.40, 0.05], atol=1e-9)
     np.testing.assert_allclose(problem.reference.position(np.zeros(1))[0], [0.40, 0.05], atol=1e-12)
     assert np.abs(problem.q_init - [0.0, 0.327, -0.754]).max() > 1e-2
-    assert evaluate(problem, lsv.solve(problem)).status is Status.SOLVED
+    assert evaluate(problem, lsv(problem)[0]).status is Status.SOLVED
 
 
 @pytest.mark.parametrize("law", ["constant_speed", "quintic", "raised_cosine"])
 def test_timing_laws_run(law: str) -> None:
     problem = prepared("+experiment=traj1", f"timing={law}", "timing.duration=10.0", "timing.steps=26")
-    solutions = [lsv.solve(problem, LsvOptions(dt=0.05)), pmke.solve(problem)]
-    solutions += global_planner.solve(problem, replace(FEW, optimised=3))
+    solutions = [lsv(problem, LsvOptions(dt=0.05))[0], pmke(problem)[0]]
+    solutions += global_planner(problem, replace(FEW, optimised=3))
     motions = [evaluate(problem, solution) for solution in solutions]
     assert [motion.status for motion in motions] == [Status.SOLVED] * len(motions)
     costs = [motion.energy_integral_spline for motion in motions[:3]]
