@@ -103,6 +103,7 @@ def test_a_start_too_close_is_refused() -> None:
         line(0.5)
 
 
+@pytest.mark.slow
 def test_an_obstacle_on_the_path_is_named() -> None:
     blocked = composed(
         "robot=planar4r",

@@ -221,6 +221,7 @@ def test_global(number: int, energy: float) -> None:
 # --- failures --------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_failing_method_fails_the_run_and_leaves_everything(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:

@@ -24,6 +24,7 @@ def trajectory3(*overrides: str) -> Problem:
     return prepare(composed("path=line", "timing.steps=50", *overrides))
 
 
+@pytest.mark.slow
 def test_limits_hold_at_every_executed_knot_and_the_cost_is_near_the_optimum() -> None:
     asked = trajectory3("limits.velocity=0.32", "limits=joint")
     done = receding(asked, WINDOW)[0]
@@ -52,6 +53,7 @@ def test_a_window_knows_the_velocity_it_comes_with() -> None:
     assert integrals(moving, times, q).integrals["torque"] == pytest.approx(0.2 * (tau**2).sum(), rel=1e-12)
 
 
+@pytest.mark.slow
 def test_torque_as_the_objective_of_the_predictions_costs_less_torque() -> None:
     asked = trajectory3()
     options = PmkeOptions(prediction_step=0.5, update_interval=0.5, horizon=4, objective="torque")
@@ -65,6 +67,7 @@ def test_torque_as_the_objective_of_the_predictions_costs_less_torque() -> None:
     assert by_torque.energy_integral[-1] > by_energy.energy_integral[-1]
 
 
+@pytest.mark.slow
 def test_what_cannot_be_met_is_said() -> None:
     asked = trajectory3("limits.velocity=0.12", "timing.steps=25")
     done = receding(asked, WINDOW)[0]
