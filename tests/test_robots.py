@@ -26,7 +26,7 @@ from pipeline.path.reference import Reference
 from pipeline.path.timing import RaisedCosine
 from pipeline.problem.costs import objective_values
 from pipeline.problem.limits import Limits
-from pipeline.problem.objective import IntegralBounds, Objective
+from pipeline.problem.objective import Objective
 from pipeline.problem.problem import Boundary, Problem
 from pipeline.problem.solution import Status
 from pipeline.program.transcription import transcribe
@@ -34,9 +34,8 @@ from pipeline.robot.mounting import Mounting
 from pipeline.search.population import population
 from pipeline.search.selection import diverse
 from tests.benchmarks.peer import PlanarArm, kinetic_energy_program, solve
-from tests.model.test_clearance import BALL, with_shapes
 from tests.program.test_program import program_jacobian, program_value
-from tests.support import ROBOTS, composed, robot, within_limits
+from tests.support import BALL, ROBOTS, composed, robot, with_shapes, within_limits
 
 
 def everything(name: str, rng: np.random.Generator) -> Problem:
@@ -59,10 +58,10 @@ def everything(name: str, rng: np.random.Generator) -> Problem:
         Reference(line, RaisedCosine(2.0), turning),
         q,
         np.linspace(0.0, 2.0, 100),
-        objective=Objective(0.5, 0.5),
+        objective=Objective({"kinetic_energy": 0.5, "torque": 0.5}),
         limits=Limits(-3 * ones, 3 * ones, ones, 50 * ones, 20 * ones),
         boundary=Boundary.FREE,
-        integral_bounds=IntegralBounds(1.0, 1e3),
+        bounds_of_integrals={"kinetic_energy": 1.0, "torque": 1e3},
         obstacles=Obstacles((BALL,), 0.03, 0.2),
     )
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from pipeline.build.regular import require_regular
 from pipeline.common.arrays import Array
 from pipeline.common.errors import ConfigError
 from pipeline.config.robot import FreeBaseConfig
@@ -14,22 +15,22 @@ from pipeline.model.arm import Arm
 from pipeline.model.base import Base, Held
 from pipeline.model.coordinates import PLANE, Coordinates
 from pipeline.model.floating import Floating, pose_coordinates
+from pipeline.problem.integrals import INTEGRALS
 from pipeline.problem.limits import Limits
 from pipeline.problem.problem import Problem
 from pipeline.robot.spacecraft import Spacecraft
-from pipeline.robot.urdf import root_mass
-
-REACTIONS = {"reaction_force", "reaction_torque"}
+from pipeline.robot.urdf import check_root, root_mass
 
 
 def place(problem: Problem, config: RunConfig) -> Problem:
     """The problem on the base that `config` asks for; raises ConfigError if they do not go together."""
     wanted = {key for key, weight in config.objective.weights.items() if weight}
     wanted |= set(config.method.pareto.objectives) if "pareto" in config.methods else set()
+    bases = {INTEGRALS[name].base for name in wanted}
     free = isinstance(config.base, FreeBaseConfig)
-    if "base_rotation" in wanted and not free:
+    if "floating" in bases and not free:
         raise ConfigError("base_rotation: the base does not move; set base=free")
-    if wanted & REACTIONS and free:
+    if "held" in bases and free:
         raise ConfigError("reaction: nothing acts on a base that floats; set base=fixed")
     if np.isfinite(problem.bounds.attitude) and not free:
         raise ConfigError(f"limits.attitude = {problem.bounds.attitude:g}: the base does not move; set base=free")
@@ -38,7 +39,7 @@ def place(problem: Problem, config: RunConfig) -> Problem:
     if isinstance(config.base, FreeBaseConfig):
         spacecraft = _spacecraft(config.base, arm)
         base = Floating(spacecraft, _coordinates(arm, spacecraft))
-    elif wanted & REACTIONS:
+    elif "held" in bases:
         base = Held(pose_coordinates(arm, Held.spacecraft))
     else:
         return problem
@@ -62,6 +63,8 @@ def _moved(problem: Problem, base: Base) -> Problem:
     """The same task, path and limits, with the base's coordinates before the joints: no limits but on its attitude."""
     fixed = problem.task.arm
     arm = Arm(fixed.description, fixed.mounting, base)
+    if base.kind == "floating":
+        require_regular(arm)
     free = np.full(base.count, np.inf)
 
     def padded(values: Array, sign: float = 1.0) -> Array:
@@ -81,6 +84,7 @@ def _moved(problem: Problem, base: Base) -> Problem:
 
 
 def _spacecraft(base: FreeBaseConfig, arm: Arm) -> Spacecraft:
+    check_root(arm.description)
     momentum = (*base.linear_momentum, *base.angular_momentum)
     if base.mass is None:
         if root_mass(arm.description) <= 0:

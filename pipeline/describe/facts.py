@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,12 +36,12 @@ class Facts:
     notes: list[str]
 
 
-def inspect(robot: RobotConfig, gravity: str | list[float] = "none") -> Facts:
+def inspect(robot: RobotConfig, gravity: str | Sequence[float] = "none") -> Facts:
     """Load the arm and look at it; raises RobotError, one line, if it cannot be used."""
     arm = load(robot, gravity)
     description = arm.description
     q_init = initial(robot, arm)
-    notes = []
+    notes = list(description.notes)
     unlimited = [n for n, v in zip(description.joints, description.velocity, strict=True) if not np.isfinite(v)]
     weak = [n for n, v in zip(description.joints, description.effort, strict=True) if not np.isfinite(v)]
     for names, what in ((unlimited, "velocity"), (weak, "effort")):

@@ -55,9 +55,8 @@ def between_knots(
             secondary[i] = plant.secondary(problem, q[i])
     rates = (energy, (qd[:, nb:] ** 2).sum(axis=1), secondary, spinning)
     integral, norm, gain, spun = (float(rate.reshape(len(dt), -1) @ weights @ dt) for rate in rates)
-    unknown = float("nan")
-    of_base = {"base_rotation": spun, "reaction_force": unknown, "reaction_torque": unknown}
-    objective = weighted_sum(problem, integral, unknown, norm, gain, of_base)
+    first_order = {"kinetic_energy": integral, "velocity_norm": norm, "base_rotation": spun}
+    objective = weighted_sum(problem, first_order, gain)
     clear = float(clearance(q[:: BETWEEN // CLEARANCES]).min())
     excess = limit_excess(problem, q, qd, tau, clear, float(turn.max()))
     return integral, objective, float(error.max()), float(turned.max()), clear, excess

@@ -43,9 +43,7 @@ class Evaluation:
     tracking_error: Array  # (N + 1,) [m]
     orientation_error: Array  # (N + 1,) [rad] angle to the prescribed orientation or direction; zero without one
     kinetic_energy: Array  # (N + 1,) T
-    energy_integral: Array  # (N + 1,) of T, running
-    torque_integral: Array  # (N + 1,) of tau'tau, running
-    velocity_norm_integral: Array  # (N + 1,) of qd'qd, running
+    integrals: dict[str, Array]  # (N + 1,) running, by the names in the catalogue (`problem/integrals.py`)
     secondary: Array  # (N + 1,) w, the sum of the objective's secondary criteria; zero without one
     objective: float  # the weighted sum of the integrals, less k0 times the trapezoidal integral of w
     objective_spline: float  # the same of the cubic spline through the knots; nan if torques count
@@ -69,10 +67,24 @@ class Evaluation:
         """`global`, `global 2`, ...: the method and, from the second on, its optimum."""
         return self.method if self.solution.optimum == 1 else f"{self.method} {self.solution.optimum}"
 
+    @property
+    def energy_integral(self) -> Array:
+        """(N + 1,) of T, running."""
+        return self.integrals["kinetic_energy"]
+
+    @property
+    def torque_integral(self) -> Array:
+        """(N + 1,) of tau'tau, running."""
+        return self.integrals["torque"]
+
+    @property
+    def velocity_norm_integral(self) -> Array:
+        """(N + 1,) of qd'qd, running."""
+        return self.integrals["velocity_norm"]
+
     def integral(self, name: str) -> float:
-        """One of problem.INTEGRALS at the end of the motion."""
-        own = {"kinetic_energy": self.energy_integral, "torque": self.torque_integral}
-        return float((own[name] if name in own else self.base.integrals[name])[-1])
+        """One of them at the end of the motion."""
+        return float(self.integrals[name][-1])
 
     @property
     def confirmed(self) -> bool:
@@ -117,8 +129,8 @@ def evaluate(problem: Problem, solution: Solution) -> Evaluation:
     moving = q
     q, qd, qdd, tau = (values[:, arm.joints] for values in (q, qd, qdd, tau))
     base = base_motion(problem, solution, place, way, turn, (q, qd, qdd))
-    energy_integral, torque_integral = running_integral(energy, dt), running_integral((tau**2).sum(axis=1), dt)
-    velocity_norm_integral = running_integral((qd**2).sum(axis=1), dt)
+    rates = {"kinetic_energy": energy, "torque": (tau**2).sum(axis=1), "velocity_norm": (qd**2).sum(axis=1)}
+    integrals = {name: running_integral(rate, dt) for name, rate in rates.items()} | base.integrals
 
     status, message = solution.status, solution.message
     if status is Status.SOLVED:
@@ -138,17 +150,12 @@ def evaluate(problem: Problem, solution: Solution) -> Evaluation:
         tracking_error=tracking,
         orientation_error=turned,
         kinetic_energy=energy,
-        energy_integral=energy_integral,
-        torque_integral=torque_integral,
-        velocity_norm_integral=velocity_norm_integral,
+        integrals=integrals,
         secondary=secondary,
         objective=weighted_sum(
             problem,
-            float(energy_integral[-1]),
-            float(torque_integral[-1]),
-            float(velocity_norm_integral[-1]),
+            {name: float(running[-1]) for name, running in integrals.items()},
             float(np.trapezoid(secondary, time)),
-            {name: float(running[-1]) for name, running in base.integrals.items()},
         ),
         objective_spline=spline_objective,
         singular_value=singular,

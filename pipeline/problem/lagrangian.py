@@ -1,8 +1,9 @@
 """The part of an objective that depends on positions and velocities alone: L(q, qd) = 1/2 qd' G(q) qd - k0 w(q).
 
-G = a M(q) + 2 c I + 2 d S(q) for a times the kinetic energy, c times the squared norm of the joint velocities and d times
-that of a floating base's angular velocity: what the inertia matrix is to the kinetic energy, G is to L. Everything that solves such problems (transcription, dynamic programming,
-calculus of variations, maximum principle, predictions) takes G, w and their derivatives from here.
+G = a M(q) + 2 c I + 2 d S(q) for a times the kinetic energy, c times the squared norm of the joint velocities and d
+times that of a floating base's angular velocity: what the inertia matrix is to the kinetic energy, G is to L. All that
+solves such problems (transcription, dynamic programming, calculus of variations, maximum principle, predictions) takes
+G, w and their derivatives from here.
 """
 
 from __future__ import annotations
@@ -19,8 +20,8 @@ class Lagrangian:
 
     def __init__(self, task: Task, objective: Objective) -> None:
         self.task, self.arm = task, task.arm
-        self.inertia, self.norm, self.secondary = objective.kinetic_energy, objective.velocity_norm, objective.secondary
-        self.rotation = objective.base_rotation
+        self.inertia, self.norm = objective.weight("kinetic_energy"), objective.weight("velocity_norm")
+        self.rotation, self.secondary = objective.weight("base_rotation"), objective.secondary
         self._of_joints = np.zeros(self.arm.n)
         self._of_joints[self.arm.joints] = 1.0
 

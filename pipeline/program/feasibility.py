@@ -33,8 +33,8 @@ class Violation:
         unit = UNITS[self.kind]
         percent = f"{100 * self.relative:.0f}" if self.relative > 0.1 else f"{100 * self.relative:.2g}"
         return (
-            f"no feasible motion: the {self.kind} limit of {self.joint} ({self.limit:.4g} {unit}) cannot be met; the least "
-            f"violation found is {percent} % ({self.reached:.4g} {unit} at t = {self.time:.3g} s)"
+            f"no feasible motion: the {self.kind} limit of {self.joint} ({self.limit:.4g} {unit}) cannot be met; the "
+            f"least violation found is {percent} % ({self.reached:.4g} {unit} at t = {self.time:.3g} s)"
         )
 
 
@@ -106,8 +106,8 @@ class Relaxed:
 def least_violation(problem: Problem, times: Array, guesses: list[Array]) -> Relaxed | None:
     """The limit to blame: the kind that, given way alone, lets a motion exist with the least excess.
 
-    If no kind suffices alone, all give way together. None if no solve succeeds. A motion without any excess is feasible:
-    the way to it led through motions that are not, which other solves do not dare.
+    If no kind suffices alone, all give way together. None if no solve succeeds. A motion without any excess is
+    feasible: the way to it led through motions that are not, which other solves do not dare.
     """
     if not guesses:
         return None

@@ -67,7 +67,7 @@ class Program:
         return self._unknowns[name]
 
     def add_rows(self, function: Any, target: Array, unknowns: Any, pattern: list[tuple[int, int]]) -> None:
-        """function(x) -> (values, Jacobian) equals `target`; pattern: the Jacobian's entries that are not always zero."""
+        """function(x) -> (values, Jacobian) equals `target`; pattern: the Jacobian's entries that can differ from 0."""
         rows = DifferentiableConstraint(function)
         binding = self.drake.AddConstraint(rows, lb=target, ub=target, vars=unknowns)
         binding.evaluator().SetGradientSparsityPattern(pattern)

@@ -14,6 +14,7 @@ import numpy as np
 
 from pipeline.common.arrays import Array
 from pipeline.problem.costs import Costs, integrals, row_kinds, velocities
+from pipeline.problem.integrals import of_order
 from pipeline.problem.lagrangian import Lagrangian
 from pipeline.problem.problem import Problem
 
@@ -31,7 +32,9 @@ SHARE = 0.1  # of the energy in the scaling of an objective to which not all vel
 
 @dataclass(frozen=True)
 class Forces:
-    """The generalized forces that are unknowns of their own: `rows` of them, of the integrals `kinds`, weighted `weights`."""
+    """The generalized forces that are unknowns: their `rows` among all n, the integrals `kinds` that they belong to,
+    and the `weights` of these in the objective.
+    """
 
     rows: list[int]
     kinds: list[str]
@@ -50,13 +53,10 @@ def lifted(problem: Problem) -> Forces:
     arm, limits, objective = problem.task.arm, problem.bounds, problem.objective
     limited = bool(np.isfinite(limits.torque).any() or np.isfinite(limits.power).any())
     kinds = row_kinds(arm)
-    rows = [
-        row
-        for row, kind in enumerate(kinds)
-        if getattr(objective, kind) > 0 or problem.integral_bounds.bounds(kind) or (limited and row >= arm.base.count)
-    ]
+    counted = {*objective.weights, *problem.bounds_of_integrals}
+    rows = [row for row, kind in enumerate(kinds) if kind in counted or (limited and row >= arm.base.count)]
     own = [kinds[row] for row in rows]
-    return Forces(rows, own, np.array([getattr(objective, kind) for kind in own]))
+    return Forces(rows, own, np.array([objective.weight(kind) for kind in own]))
 
 
 @dataclass(frozen=True)
@@ -74,9 +74,9 @@ class Guess:
 
 @dataclass(frozen=True)
 class Scaling:
-    """to_velocity (N, n, n): qd_i = to_velocity_i w_i; force (N, forces): u_i = force_i tau_i; costs are divided by `cost`.
+    """to_velocity (N, n, n): qd_i = to_velocity_i w_i; force (N, forces): u_i = force_i tau_i.
 
-    diagonal: whether a w is a joint's velocity by itself.
+    cost: what costs are divided by. diagonal: whether a w is a joint's velocity by itself.
     """
 
     cost: float
@@ -93,7 +93,7 @@ def scale(problem: Problem, times: Array, guess: Guess, forces: Forces) -> Scali
     """Choose S_i and s_i from the guess, so that the objective there is 1."""
     dt, costs, objective = np.diff(times), guess.costs, problem.objective
     # A guess without any base rotation has a cost near zero; its size is then seen from the joints' motion.
-    least = NEGLIGIBLE * objective.base_rotation * costs.velocity_norm
+    least = NEGLIGIBLE * objective.weight("base_rotation") * costs.integrals["velocity_norm"]
     cost = max(costs.value(objective), least) or 1.0
     to_velocity = _energy_units(problem, dt, guess, cost)
     diagonal = to_velocity is None
@@ -103,11 +103,12 @@ def scale(problem: Problem, times: Array, guess: Guess, forces: Forces) -> Scali
 
 
 def _energy_units(problem: Problem, dt: Array, guess: Guess, cost: float) -> Array | None:
-    """The inverse S_i (N, n, n), by which the energy is half |w|^2; None where no velocity is penalised or bounded."""
+    """The inverse S_i (N, n, n), by which the energy is half |w|^2; None where no velocity counts."""
     arm, lagrangian, q = problem.task.arm, Lagrangian(problem.task, problem.objective), guess.q
-    if not (lagrangian.is_quadratic or problem.integral_bounds.bounds("kinetic_energy", "base_rotation")):
+    if not (lagrangian.is_quadratic or of_order(problem.bounds_of_integrals, 1)):
         return None
-    nb, energy = arm.base.count, guess.costs.kinetic_energy if guess.costs.kinetic_energy > 0 else 1.0
+    nb, energy = arm.base.count, guess.costs.integrals["kinetic_energy"]
+    energy = energy if energy > 0 else 1.0
     # Half |w|^2 is the energy's share of the cost, or its ratio to the guess's where it is only bounded.
     share = 1 / cost if lagrangian.is_quadratic else 1 / energy
     metric = lagrangian.metric(q[1:]) if lagrangian.is_quadratic else arm.mass_matrix(q[1:])
@@ -129,9 +130,9 @@ def _force_units(problem: Problem, dt: Array, guess: Guess, forces: Forces, cost
     size = float(np.sqrt(np.mean(tau**2))) if forces else 1.0
     units = np.full(tau.shape, 0.1 / ((size or 1.0) * np.sqrt(len(dt))))
     for column, (kind, weight) in enumerate(zip(forces.kinds, forces.weights, strict=True)):
-        total = getattr(costs, kind)
+        total = costs.integrals[kind]
         if weight > 0:
             units[:, column] = np.sqrt(weight * dt / cost)
-        elif problem.integral_bounds.bounds(kind):
+        elif kind in problem.bounds_of_integrals:
             units[:, column] = np.sqrt(dt / (total if total > 0 else 1.0))
     return units

@@ -7,9 +7,8 @@ Every quantity that is penalised or limited is an unknown of its own, tied to th
     u_i = s_i tau_i,    tau_i = M(q_i) qdd_i + n(q_i, qd_i)           of those forces and torques that count,
 
 with backward differences throughout: qdd_i = (qd_i - qd_(i-1)) / dt_i (PMKE paper eq. (4), Global paper eqs (3)-(6));
-`scaling.py` chooses S_i and s_i. Each term below is a function in a file of its own that adds its unknowns with their
-start, its rows, bounds and costs, and returns at once where it does not apply. A term comes after those whose unknowns it
-takes by name.
+`scaling.py` chooses S_i and s_i. Each term below adds its unknowns with their start, its rows, bounds and costs, and
+returns at once where it does not apply. It comes after the terms whose unknowns it takes by name.
 """
 
 from __future__ import annotations
@@ -46,8 +45,9 @@ def transcribe(
 ) -> Program:
     """The program of `problem` on the knots `times` (N + 1,), scaled for a solve that starts at `guess` (N + 1, n).
 
-    elastic: kinds of limits (position, velocity, torque, power, clearance, attitude) that may all be exceeded by the same
-    fraction; that fraction is then what is minimised. keep_off: [m] by how much more than the margin obstacles are kept off.
+    elastic: kinds of limits (position, velocity, torque, power, clearance, attitude) that may all be exceeded by the
+    same fraction; that fraction is then what is minimised. keep_off: [m] by how much more than the margin obstacles are
+    kept off.
     """
     program = Program(problem, times, guess, elastic=elastic, keep_off=keep_off)
     for term in TERMS:

@@ -14,7 +14,7 @@ from pipeline.artifacts.recording.recording import read_series
 from pipeline.artifacts.scene import box, corners
 from pipeline.build.problem import prepare
 from pipeline.evaluation.base import BaseMotion
-from pipeline.run import run
+from pipeline.run.run import run
 from tests.support import composed
 
 SMALL = (
@@ -28,7 +28,7 @@ SMALL = (
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     made = tmp_path_factory.mktemp("floating")
-    assert run.run_and_write(composed("+experiment=floating3r", *SMALL, "parallel.workers=1"), made) == 0
+    assert run(composed("+experiment=floating3r", *SMALL, "parallel.workers=1"), made) == 0
     return made
 
 
@@ -97,7 +97,7 @@ def test_front_of_rotation_against_energy(tmp_path: Path) -> None:
         "method.pareto.rounds=1",
         "method.pareto.max_iterations=60",
     )
-    assert run.run_and_write(composed("+experiment=floating_front", *words, "parallel.workers=1"), tmp_path) == 0
+    assert run(composed("+experiment=floating_front", *words, "parallel.workers=1"), tmp_path) == 0
     front = pd.read_csv(tmp_path / "front.csv")
     good = front[front["status"] == "optimal"]
     assert len(good) >= 10

@@ -47,7 +47,7 @@ def traced(task: PositionTask, knots: Array, at_rest: bool) -> Problem:
     """A torque problem from rest, which ties the first velocity, or an energy problem entered at speed."""
     ends = ((1, np.zeros(3)), "not-a-knot") if at_rest else "not-a-knot"
     timing = RaisedCosine(3.0) if at_rest else ConstantSpeed(3.0)
-    objective = Objective(0.0, 1.0) if at_rest else Objective()
+    objective = Objective({"torque": 1.0}) if at_rest else Objective()
     reference = Traced(task, CubicSpline(TIME, knots, bc_type=ends), timing)
     return Problem(task, reference, knots[0], TIME, objective=objective)  # type: ignore[arg-type]
 

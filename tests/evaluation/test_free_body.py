@@ -18,7 +18,7 @@ from pipeline.methods.method import Context
 from pipeline.methods.pmke.predictive import pmke
 from pipeline.methods.registry import METHODS
 from pipeline.problem.costs import integrals
-from pipeline.problem.objective import IntegralBounds, Objective
+from pipeline.problem.objective import Objective
 from pipeline.problem.problem import Boundary, Problem
 from pipeline.problem.solution import Solution, Status, Trajectory
 from pipeline.program.feasibility import least_violation, violations
@@ -26,7 +26,8 @@ from pipeline.program.transcription import transcribe
 from tests.program.test_program import program_jacobian, program_value
 from tests.support import composed
 
-SHORT = ("timing.duration=4", "timing.steps=40", "method.global.optimised=4")
+FEW = tuple(f"method.global.{key}" for key in ("configurations=8", "candidates=100", "optimised=2"))
+SHORT = ("timing.duration=4", "timing.steps=30", *FEW)
 ON_BASE = ("robot=planar3r_base", "base=free", *SHORT)
 CIRCLE = ("path=circle", "path.radius=0.05", "boundary=cyclic")
 
@@ -84,13 +85,13 @@ def test_momentum_and_path_of_the_other_methods(method: str) -> None:
 @pytest.mark.slow
 def test_the_path_error_is_of_second_order_in_the_step() -> None:
     errors = []
-    for steps in (50, 100, 200):
-        problem, solution = stated(*ON_BASE[:-2], f"timing.steps={steps}", "method.global.optimised=1")
+    for steps in (25, 50, 100):
+        problem, solution = stated(*ON_BASE, f"timing.steps={steps}", "method.global.optimised=1")
         joints = solution.trajectory.q[:, problem.task.arm.joints]
         found = integrate(problem, solution.trajectory.time, joints)
         errors.append(found.path_error)
     order = np.log2(np.array(errors[:-1]) / errors[1:])
-    assert errors[-1] < 1e-6
+    assert errors[-1] < 5e-6
     assert np.all((order > 1.8) & (order < 2.4)), order
 
 
@@ -124,7 +125,7 @@ def test_momentum_that_is_given_is_kept() -> None:
 def test_limits_are_kept_and_felt() -> None:
     free = solved(*ON_BASE, "boundary=free")[1]
     limits = ("limits=joint", "limits.velocity=1.0", "limits.torque=0.03", "limits.power=0.02", "limits.attitude=0.05")
-    e = solved(*ON_BASE, "boundary=free", "method.global.optimised=8", *limits)[1]
+    e = solved(*ON_BASE, "boundary=free", "method.global.optimised=4", *limits)[1]
     assert e.status is Status.SOLVED, e.message
     assert set(e.limit_excess) == {"position", "velocity", "torque", "power", "attitude"}
     assert max(e.limit_excess.values()) <= 1e-6
@@ -159,7 +160,7 @@ def test_an_attitude_that_is_exceeded_is_named() -> None:
 
 def test_a_fine_grid_does_not_make_a_cycle_harder() -> None:
     """Closed joints leave the base turns about the centre of mass alone: rows that these cannot change must not be there."""
-    _, solution = stated(*ON_BASE, *CIRCLE, "timing.steps=100", "method.global.optimised=2")
+    _, solution = stated(*ON_BASE, *CIRCLE, "timing.steps=100", "method.global.optimised=1")
     assert solution.status is Status.SOLVED, solution.message
     assert solution.statistics["solves"][-1]["iterations"] < 30
 
@@ -191,7 +192,7 @@ def test_a_cycle_with_torques() -> None:
     assert e.status is Status.SOLVED, e.message
     assert np.abs(e.q[-1] - e.q[0]).max() < 1e-9
     costs = integrals(problem, problem.times, e.solution.trajectory.q)
-    assert e.torque_integral[-1] == pytest.approx(costs.torque, rel=1e-6)
+    assert e.torque_integral[-1] == pytest.approx(costs.integrals["torque"], rel=1e-6)
     energy = solved(*ON_BASE, *CIRCLE)[1]
     assert e.torque_integral[-1] < energy.torque_integral[-1]
 
@@ -204,9 +205,8 @@ def test_heavy_bases_are_fixed_ones_in_the_limit() -> None:
     """Energies differ from the fixed base's in proportion to 1 / mass, the base turns in proportion to it."""
     words = (
         *SHORT,
-        "method.global.optimised=2",
         "path.length=0.2",
-        "timing.steps=25",
+        "timing.steps=16",
         "method.pmke.prediction_step=0.8",
         "method.pmke.update_interval=0.4",
     )
@@ -243,7 +243,7 @@ def test_reactions_are_the_rate_of_momentum(rng: np.random.Generator) -> None:
     assert e.base.reaction is not None
     plant, h = BasePlant(problem.task.arm), 1e-5
     rotation, position = plant.start
-    for i in (5, 17, 33):
+    for i in (4, 13, 25):
         sides = []
         for sign in (1, -1):
             qd = e.qd[i] + sign * h * e.qdd[i]
@@ -261,8 +261,8 @@ def test_least_reaction_on_a_held_base() -> None:
     assert e.status is Status.SOLVED, e.message
     assert e.objective == pytest.approx(0.1 * e.integral("reaction_force") + e.integral("reaction_torque"))
     costs = integrals(problem, problem.times, e.solution.trajectory.q)
-    assert e.integral("reaction_force") == pytest.approx(costs.reaction_force, rel=1e-6)
-    assert e.integral("reaction_torque") == pytest.approx(costs.reaction_torque, rel=1e-6)
+    assert e.integral("reaction_force") == pytest.approx(costs.integrals["reaction_force"], rel=1e-6)
+    assert e.integral("reaction_torque") == pytest.approx(costs.integrals["reaction_torque"], rel=1e-6)
     assert e.objective < 0.8 * (0.1 * energy.integral("reaction_force") + energy.integral("reaction_torque"))
     # The same joints on the plain fixed base: the same energies and torques.
     again = evaluate(plain, Solution("x", Trajectory(e.time, e.q), Status.SOLVED))
@@ -273,7 +273,7 @@ def test_least_reaction_on_a_held_base() -> None:
 @pytest.mark.slow
 def test_least_turning_brings_the_base_to_rest() -> None:
     """A planar arm with r = 1 can follow the path and turn its base by nothing."""
-    e = solved(*ON_BASE, "objective=base_rotation", "method.global.optimised=6")[1]
+    e = solved(*ON_BASE, "objective=base_rotation", "method.global.optimised=4")[1]
     energy = solved(*ON_BASE)[1]
     assert e.status is Status.SOLVED, e.message
     assert e.integral("base_rotation") < 1e-6 * energy.integral("base_rotation")
@@ -282,14 +282,17 @@ def test_least_turning_brings_the_base_to_rest() -> None:
 
 # --- the program ------------------------------------------------------------------------------------------------------
 
+MIXED = Objective({"kinetic_energy": 0.5, "torque": 0.3, "base_rotation": 0.2})
+
+
 PROGRAMS = {
     "planar, all limits": (
         ("robot=planar3r_base", "base=free", "limits=joint_torque_power", "limits.attitude=0.3"),
-        {"objective": Objective(0.5, 0.3, base_rotation=0.2), "integral_bounds": IntegralBounds(1.0, 1.0, 0.5)},
+        {"objective": MIXED, "bounds_of_integrals": {"kinetic_energy": 1.0, "torque": 1.0, "base_rotation": 0.5}},
     ),
     "planar, cycle, momentum": (
         ("robot=planar3r_base", "base=free", "base.linear_momentum=[0.1,0.2,0]", *CIRCLE, "limits=joint_torque_power"),
-        {"objective": Objective(0.0, 1.0)},
+        {"objective": Objective({"torque": 1.0})},
     ),
     "panda, all limits": (
         (
@@ -303,13 +306,13 @@ PROGRAMS = {
             ),
             *("limits=joint_torque_power", "base.angular_momentum=[0.1,0,0.2]", "robot.orientation=pointing"),
         ),
-        {"objective": Objective(0.5, 0.3, base_rotation=0.2), "integral_bounds": IntegralBounds(base_rotation=0.5)},
+        {"objective": MIXED, "bounds_of_integrals": {"base_rotation": 0.5, "velocity_norm": 3.0}},
     ),
     "panda, held": (
         ("robot=panda", "objective=reaction", "path.direction=[0,1,0]", "limits=joint_torque_power"),
         {
-            "objective": Objective(0.0, reaction_force=0.4, reaction_torque=0.6),
-            "integral_bounds": IntegralBounds(reaction_torque=2.0, torque=3.0),
+            "objective": Objective({"reaction_force": 0.4, "reaction_torque": 0.6}),
+            "bounds_of_integrals": {"reaction_torque": 2.0, "torque": 3.0},
         },
     ),
 }

@@ -15,7 +15,8 @@ from pipeline.methods.method import ANY, Context, Serves
 from pipeline.methods.registry import METHODS
 from pipeline.problem.problem import Boundary
 from pipeline.problem.solution import Status
-from pipeline.run.solve import solve, state
+from pipeline.run.solve import solve
+from pipeline.run.state import state
 from tests.support import composed
 
 FEW = ("configurations=4", "candidates=30", "optimised=4", "same_path=0.5")

@@ -12,13 +12,13 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
-from pipeline.artifacts import style
 from pipeline.artifacts.figures import solids
 from pipeline.artifacts.figures.panels import EVENT, INK, PALE, PATH, new_figure, shape_of, thin, tidy
 from pipeline.artifacts.scene import outlines
 from pipeline.evaluation.evaluation import Evaluation
 from pipeline.model.task import AXES
 from pipeline.problem.problem import Problem
+from pipeline.studies import style
 
 POSES = 18  # of one stroboscopic view
 

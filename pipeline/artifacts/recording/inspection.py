@@ -9,11 +9,11 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from pipeline.artifacts import style
 from pipeline.artifacts.recording.arm import columns, draw_arm, strict
 from pipeline.artifacts.recording.blueprint import BACKGROUND, GRID, pixels
 from pipeline.common.arrays import Array
 from pipeline.model.arm import Arm
+from pipeline.studies import style
 
 COLOR = (70, 120, 170, 255)
 

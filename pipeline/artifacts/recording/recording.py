@@ -18,32 +18,42 @@ import rerun as rr
 from rerun.chunk import RrdReader
 from scipy.spatial.transform import Rotation
 
-from pipeline.artifacts import style
 from pipeline.artifacts.figures.solids import outline
 from pipeline.artifacts.recording import blueprint
 from pipeline.artifacts.recording.arm import columns, draw_arm, strict
 from pipeline.artifacts.recording.blueprint import faded, pixels, rgba, slug
+from pipeline.artifacts.report import Report
 from pipeline.artifacts.scene import box, corners, outlines
+from pipeline.artifacts.summary import text
 from pipeline.common.arrays import Array
 from pipeline.evaluation.evaluation import Evaluation
 from pipeline.model.arm import Arm
 from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Status
 from pipeline.robot.shapes import Shape
+from pipeline.studies import style
 
 POSES = 12  # of the stroboscopic picture
-
-
 SOLID = 110  # opacity of the arms, of 255: those behind must shine through
-
-
 REFERENCE = (190, 190, 190)
-
-
 OBSTACLE = (200, 70, 60, 255)
 
 
-def write(
+def write(report: Report, folder: Path) -> None:
+    """recording.rrd in `folder`: all motions, with the figure that a study has chosen to open it."""
+    cover = next((result.cover for result in report.results if result.cover), None)
+    save(
+        folder / "recording.rrd",
+        report.motions.problem,
+        report.motions.evaluations,
+        name=report.motions.config.name,
+        summary=text(report),
+        properties={key: value for key, value in report.facts.items() if key != "inputs"},
+        picture=None if cover is None else folder / "figures" / f"{cover}.png",
+    )
+
+
+def save(
     file: Path,
     problem: Problem,
     evaluations: Sequence[Evaluation],
@@ -51,24 +61,24 @@ def write(
     name: str,
     summary: str,
     properties: Mapping[str, Any],
-    front: Path | None = None,
+    picture: Path | None = None,
 ) -> None:
     """Write the recording `file` (.rrd) of all `evaluations`, or raise and leave nothing behind.
 
     summary: Markdown, shown beside the plots. properties: facts of the run, stored as the recording's property `run`.
-    front: a PNG to show first, such as the Pareto front (2-D views have no axes of their own).
+    picture: a PNG to show first, such as the Pareto front (2-D views have no axes of their own).
     """
     temporary = file.with_name(f"{file.name}.tmp")
     try:
         with strict(), rr.RecordingStream("selfmotion") as recording:
-            recording.save(temporary, default_blueprint=_layout(problem, evaluations, front is not None))
+            recording.save(temporary, default_blueprint=_layout(problem, evaluations, picture))
             recording.send_recording_name(name)
             if facts := _facts(properties):
                 recording.send_property("run", facts)
             document = rr.TextDocument(summary, media_type=rr.MediaType.MARKDOWN)
             recording.log("summary", document, static=True)
-            if front is not None:
-                recording.log("picture", rr.EncodedImage(path=front), static=True)
+            if picture is not None:
+                recording.log("picture", rr.EncodedImage(path=picture), static=True)
             _send_reference(recording, problem)
             if problem.obstacles is not None:
                 send_obstacles(recording, problem.obstacles.shapes, _planar(problem))
@@ -95,7 +105,7 @@ def read_series(file: Path, entity: str) -> tuple[Array, Array]:
     return time[order], value[order]
 
 
-def _layout(problem: Problem, evaluations: Sequence[Evaluation], front: bool) -> Any:
+def _layout(problem: Problem, evaluations: Sequence[Evaluation], picture: Path | None) -> Any:
     points = [np.array([problem.task.arm.mounting.base_position]), _reference(problem)]
     if problem.obstacles is not None:
         points.append(np.array([shape.position for shape in problem.obstacles.shapes]))
@@ -106,13 +116,14 @@ def _layout(problem: Problem, evaluations: Sequence[Evaluation], front: bool) ->
         points += [corners(arm, e.base)[_finite(e)].reshape(-1, 3) for e in evaluations]
     labels = [evaluation.label for evaluation in evaluations]
     revolute = problem.task.arm.description.turning.tolist()
+    tab = "" if picture is None else picture.stem.replace("_", " ").capitalize()
     return blueprint.build(
-        labels, np.concatenate(points), revolute, _planar(problem), _ranges(evaluations), front, floats
+        labels, np.concatenate(points), revolute, _planar(problem), _ranges(evaluations), tab, floats
     )
 
 
 def _ranges(evaluations: Sequence[Evaluation]) -> dict[str, tuple[float, float]]:
-    """What to show of the energies: a motion that met a singularity shoots up there and would flatten all the others."""
+    """What to show of the energies: a motion that met a singularity shoots up there and would flatten the others."""
     usable = [evaluation for evaluation in evaluations if evaluation.status is Status.SOLVED]
     ranges = {}
     for entity in blueprint.ENERGIES if 0 < len(usable) < len(evaluations) else ():
@@ -232,7 +243,7 @@ def _send_stick(
     kinds: tuple[Any, Any],
     extra: dict[str, Any],
 ) -> None:
-    """The stick figure (K, n + 1, 2 or 3), its joints, and the end effector with its trace; `kinds`: lines and points."""
+    """The stick figure (K, n + 1, 2 or 3), its joints, the end effector with its trace; `kinds`: lines and points."""
     lines, dots = kinds
     tip, count = skeleton[:, -1], skeleton.shape[1]
     shown = {"colors": rgba(label), **extra}

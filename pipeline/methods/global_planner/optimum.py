@@ -12,7 +12,8 @@ from pipeline.common.arrays import Array
 from pipeline.config.methods import GlobalOptions
 from pipeline.model.clearance import Clearance
 from pipeline.model.obstacles import Obstacles
-from pipeline.problem.costs import SECOND_ORDER, objective_values
+from pipeline.problem.costs import objective_values
+from pipeline.problem.integrals import of_order
 from pipeline.problem.lagrangian import Lagrangian
 from pipeline.problem.objective import Objective
 from pipeline.problem.problem import Problem
@@ -63,7 +64,7 @@ def optimise_start(context: tuple[Problem, Array, GlobalOptions], guess: Array) 
     first: Optimum | None = None
     if problem.objective.second_order or _limits_torque(problem):
         first_order = Lagrangian(problem.task, problem.objective).is_quadratic
-        only = replace(problem.objective, torque=0.0, reaction_force=0.0, reaction_torque=0.0)
+        only = replace(problem.objective, weights=of_order(problem.objective.weights, 1))
         objective = only if first_order else Objective()
         first = _optimise(replace(_without_torque_limits(problem), objective=objective), times, guess, options)
         solves += first.solves
@@ -112,7 +113,7 @@ def _optimise_lazily(
     """As `_optimise`; but where torque limits alone bring torques in and the guess keeps them, it is tried without."""
     if (
         problem.objective.second_order
-        or problem.integral_bounds.bounds(*SECOND_ORDER)
+        or of_order(problem.bounds_of_integrals, 2)
         or not _limits_torque(problem)
         or not _keeps_torque_limits(problem, times, guess)
     ):

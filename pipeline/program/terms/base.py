@@ -25,11 +25,6 @@ def enters(program: Program) -> bool:
     return program.closed and bool(program.forces) and program.arm.base.kind == "floating"
 
 
-def turning(program: Program) -> Rate:
-    """The squared angular velocity of the base."""
-    return program.arm.base.turning
-
-
 def momentum(program: Program) -> None:
     """M_b qd_i = p over every interval from q_(i-1): exact for linear momentum, of second order for angular."""
     if program.arm.base.kind != "floating":
@@ -50,7 +45,7 @@ def _conserve(program: Program, block: Block) -> None:
 
 
 def _enter(program: Program) -> None:
-    """The velocity that a cycle is entered with: the joints' is the last interval's, the base's follows from momentum."""
+    """The velocity that a cycle is entered with: the joints' last one, and the base's that momentum gives it."""
     arm = program.arm
     entry, last = program["entry"], np.array([program.intervals - 1])
     joints = program.scaling.to_velocity[-1][program.nb :]
@@ -66,8 +61,8 @@ def _enter(program: Program) -> None:
 
 
 def _momentum_rows(program: Program, residual: Rate, y: Any, w: Any, intervals: Block) -> None:
-    """The residual of the positions y and velocities w is zero: each row divided by M_bb of the guess and the size of its
-    velocity.
+    """The residual of the positions y and velocities w is zero: each row divided by M_bb of the guess and the size of
+    its velocity.
     """
     nb, n, count = program.nb, program.n, len(intervals)
     rate = program.scaling.to_velocity[intervals]

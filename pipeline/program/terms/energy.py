@@ -1,7 +1,7 @@
 """The part of the objective that depends on positions and velocities: 1/2 qd' G qd - k0 w(q) (`lagrangian.py`).
 
-The secondary criterion is integrated by the trapezoidal rule: with the velocity norm the program is then of second order
-in the step.
+The secondary criterion is integrated by the trapezoidal rule: with the velocity norm the program is then of second
+order in the step.
 """
 
 from __future__ import annotations

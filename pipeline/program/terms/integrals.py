@@ -8,10 +8,11 @@ import numpy as np
 from pydrake.solvers import QuadraticConstraint
 
 from pipeline.common.arrays import Array
-from pipeline.problem.objective import INTEGRALS
+from pipeline.problem.integrals import INTEGRALS
+from pipeline.problem.lagrangian import Lagrangian
+from pipeline.problem.objective import Objective
 from pipeline.program.differentiable import DifferentiableConstraint
-from pipeline.program.program import Block, Program, Rate, blocks
-from pipeline.program.terms import base
+from pipeline.program.program import Block, Program, blocks
 from pipeline.program.terms.energy import weighted_sum
 
 
@@ -20,23 +21,17 @@ def bound(program: Program) -> None:
     if program.elastic:
         return
     parts = blocks(0, program.intervals)
-    for kind in INTEGRALS:
-        bound = getattr(program.problem.integral_bounds, kind)
-        if not np.isfinite(bound):
-            continue
-        sums = program.new(f"{kind} sums", np.full(len(parts), 1.0 / len(parts)))
+    for name, bound in program.problem.bounds_of_integrals.items():
+        sums = program.new(f"{name} sums", np.full(len(parts), 1.0 / len(parts)))
         for block, total in zip(parts, sums, strict=True):
-            if kind == "kinetic_energy":
-                _first_order(program, program.arm.kinetic_energy_gradient, block, total, bound)
-            elif kind == "base_rotation":
-                _first_order(program, base.turning(program), block, total, bound)
-            else:
-                _squares(program, kind, block, total, bound)
+            add = _first_order if INTEGRALS[name].order == 1 else _squares
+            add(program, name, block, total, bound)
         # Scaled by the bound: the sums add up to at most 1.
         program.drake.AddLinearConstraint(np.ones((1, len(sums))), [-np.inf], [1.0], sums)
 
 
-def _first_order(program: Program, rate: Rate, block: Block, total: Any, bound: float) -> None:
+def _first_order(program: Program, name: str, block: Block, total: Any, bound: float) -> None:
+    rate = Lagrangian(program.task, Objective({name: 1.0})).quadratic_gradient
     energy = weighted_sum(program, rate, block, program.dt[block] / bound)
 
     def excess(x: Array) -> tuple[Array, Array]:
@@ -47,9 +42,9 @@ def _first_order(program: Program, rate: Rate, block: Block, total: Any, bound: 
     program.drake.AddConstraint(DifferentiableConstraint(excess), lb=[-np.inf], ub=[0.0], vars=unknowns)
 
 
-def _squares(program: Program, kind: str, block: Block, total: Any, bound: float) -> None:
+def _squares(program: Program, name: str, block: Block, total: Any, bound: float) -> None:
     """u = s tau, and the integral is the sum of tau'tau dt."""
-    own = program.forces.of(kind)
+    own = program.forces.of(name)
     weight = (program.dt[block, None] / (program.scaling.force[block][:, own] ** 2 * bound)).ravel()
     form = np.diag(np.append(2 * weight, 0.0))
     linear = np.append(np.zeros(len(weight)), -1.0)

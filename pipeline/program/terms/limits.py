@@ -1,4 +1,4 @@
-"""Limits on joint motion. Position and torque limits are bounds; velocity limits bounds or linear rows; power limits bilinear."""
+"""Limits on joint motion: of position and torque as bounds, of velocity as bounds or linear rows, of power bilinear."""
 
 from __future__ import annotations
 
