@@ -92,16 +92,19 @@ class Peer(Side):
             self.seconds -= passed  # it happens within a timed solve
         return self.programs[key]
 
-    def _solve(self, problem: Problem, times: Array, guess: Array, options: GlobalOptions) -> Optimum:
+    def _solve(
+        self, problem: Problem, times: Array, guess: Array, options: GlobalOptions, keep_off: float = 0.0
+    ) -> Optimum:
+        assert not keep_off, "the peer knows no obstacles"
         q, cost, statistics = self.program(problem, times, options).solve(guess)
         status = statistics["return_status"]
         return Optimum(q, cost, status in CONVERGED, status)
 
 
-def simulation(name: str) -> None:
+def simulation(name: str, *words: str) -> None:
     """One line for the multi-start, one for `starts=dynamic_programming` where that applies, and the optima of all."""
     with initialize_config_dir(str(peer.PROJECT / "conf"), version_base="1.3"):
-        config = checked(compose("config", overrides=[f"+experiment={name}"]))
+        config = checked(compose("config", overrides=[f"+experiment={name}", *words]))
     problem, options = prepare(config), config.method.global_
     grids = planner.refinement(problem.times, options.coarse_steps)
     motions, _ = planner._starts(problem, grids[0], options, np.random.default_rng(config.seed))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import os
 from dataclasses import replace
 
 import numpy as np
@@ -26,7 +25,6 @@ from tests.support import ROOT
 CONF = str(ROOT / "conf")
 FEW = tuple(f"method.global.{key}" for key in ("configurations=12", "candidates=150", "optimised=12"))
 GRID = "method.global.starts=dynamic_programming"
-WORKERS = Workers(min(2, os.cpu_count() or 1))
 
 
 def configured(*words: str) -> RunConfig:
@@ -38,7 +36,7 @@ def configured(*words: str) -> RunConfig:
 def solved(*words: str) -> tuple[Problem, list[Evaluation]]:
     config = configured(*words)
     problem = prepare(config)
-    solutions = global_planner(problem, config.method.global_, Context(config.seed, WORKERS))
+    solutions = global_planner(problem, config.method.global_, Context(config.seed))
     return problem, [evaluate(problem, solution) for solution in solutions]
 
 

@@ -97,6 +97,7 @@ def test_numbers_are_those_of_the_evaluation() -> None:
         assert found[f"peak_power_{j + 1}"] == pytest.approx(e.power[:, j].max(), rel=1e-6)
 
 
+@pytest.mark.slow
 def test_the_fit_starts_at_the_masses_of_the_arm_and_recovers_others(
     as_printed: Arm, monkeypatch: pytest.MonkeyPatch
 ) -> None:
