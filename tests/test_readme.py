@@ -12,7 +12,7 @@ from hydra import compose, initialize_config_dir
 from pipeline.config.compose import checked
 from pipeline.describe.facts import inspect
 from pipeline.run.main import CONF
-from pipeline.run.solve import state
+from pipeline.run.state import state
 
 ROOT = Path(__file__).resolve().parent.parent
 TEXTS = {name: (ROOT / name).read_text(encoding="utf-8") for name in ("README.md", "docs/errata.md", "docs/tour.md")}
