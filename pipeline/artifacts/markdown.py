@@ -10,7 +10,7 @@ import pandas as pd
 
 from pipeline.artifacts.report import Report
 from pipeline.common.markdown import markdown_table
-from pipeline.config.studies import PublishedConfig
+from pipeline.config.documents import Printed
 from pipeline.evaluation.evaluation import Evaluation
 from pipeline.problem.integrals import INTEGRALS
 
@@ -40,7 +40,7 @@ UNITS = {
 }
 
 
-def markdown(report: Report, table: pd.DataFrame, published: PublishedConfig) -> str:
+def markdown(report: Report, table: pd.DataFrame, published: Printed) -> str:
     """The summary for people: a row per quantity and a column per motion, published values and differences beside.
 
     table: summary.csv.

@@ -14,8 +14,7 @@ from scipy.spatial.transform import Rotation
 from pipeline.artifacts.markdown import markdown
 from pipeline.artifacts.report import Report
 from pipeline.common.files import write_beside
-from pipeline.config.run import RunConfig
-from pipeline.config.studies import PublishedConfig
+from pipeline.config.documents import printed_for
 from pipeline.evaluation.evaluation import Evaluation
 from pipeline.model.task import PositionTask
 from pipeline.problem.integrals import INTEGRALS
@@ -35,12 +34,12 @@ def write(report: Report, folder: Path) -> None:
 
 def text(report: Report) -> str:
     """summary.md: the summary for people."""
-    return markdown(report, summary(report), published(report.motions.config))
+    return markdown(report, summary(report), printed_for(report.motions.config.name))
 
 
 def summary(report: Report) -> pd.DataFrame:
     """One row per motion; `published_*` and `difference_*` (relative) columns where a document prints the number."""
-    motions, printed = report.motions, published(report.motions.config)
+    motions, printed = report.motions, printed_for(report.motions.config.name)
     rows: list[dict[str, Any]] = []
     for e in motions.evaluations:
         row = _row(motions.problem, e)
@@ -53,11 +52,6 @@ def summary(report: Report) -> pd.DataFrame:
             row["published_note"] = printed.note
         rows.append(row)
     return pd.DataFrame(rows)
-
-
-def published(config: RunConfig) -> PublishedConfig:
-    """What a document prints of this experiment."""
-    return config.published
 
 
 def _differences(row: Mapping[str, Any], printed: Mapping[str, float]) -> dict[str, float]:

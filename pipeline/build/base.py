@@ -25,7 +25,7 @@ from pipeline.robot.urdf import check_root, root_mass
 def place(problem: Problem, config: RunConfig) -> Problem:
     """The problem on the base that `config` asks for; raises ConfigError if they do not go together."""
     wanted = {key for key, weight in config.objective.weights.items() if weight}
-    wanted |= set(config.pareto.objectives) if "pareto" in config.methods else set()
+    wanted |= set(config.method.pareto.objectives) if "pareto" in config.methods else set()
     bases = {INTEGRALS[name].base for name in wanted}
     free = isinstance(config.base, FreeBaseConfig)
     if "floating" in bases and not free:
@@ -43,6 +43,8 @@ def place(problem: Problem, config: RunConfig) -> Problem:
         base = Held(pose_coordinates(arm, Held.spacecraft))
     else:
         return problem
+    if config.closed_loop.run:
+        raise ConfigError("closed_loop.run: the controller is one for arms on a fixed base")
     if problem.objective.secondary is not None:
         raise ConfigError("objective.secondary: secondary criteria are for arms on a fixed base")
     if np.any(arm.mounting.gravity) and free:

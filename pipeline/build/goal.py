@@ -29,7 +29,7 @@ def make_limits(limits: LimitsConfig, arm: Arm) -> Limits:
         given = getattr(limits, key)
         if given is None:
             return own
-        if isinstance(given, list) and len(given) != arm.n:
+        if isinstance(given, tuple) and len(given) != arm.n:
             raise ConfigError(f"limits.{key} has {len(given)} values, the arm has {arm.n} moving joints")
         values = np.broadcast_to(np.asarray(given, dtype=float), arm.n)
         return np.where(np.abs(values) < UNLIMITED, values, np.copysign(np.inf, values))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,7 +36,7 @@ class Facts:
     notes: list[str]
 
 
-def inspect(robot: RobotConfig, gravity: str | list[float] = "none") -> Facts:
+def inspect(robot: RobotConfig, gravity: str | Sequence[float] = "none") -> Facts:
     """Load the arm and look at it; raises RobotError, one line, if it cannot be used."""
     arm = load(robot, gravity)
     description = arm.description

@@ -1,9 +1,9 @@
 """The part of an objective that depends on positions and velocities alone: L(q, qd) = 1/2 qd' G(q) qd - k0 w(q).
 
 G = a M(q) + 2 c I + 2 d S(q) for a times the kinetic energy, c times the squared norm of the joint velocities and d
-times that of a floating base's angular velocity: what the inertia matrix is to the kinetic energy, G is to L. Everything
-that solves such problems (transcription, dynamic programming, calculus of variations, maximum principle, predictions)
-takes G, w and their derivatives from here.
+times that of a floating base's angular velocity: what the inertia matrix is to the kinetic energy, G is to L. All that
+solves such problems (transcription, dynamic programming, calculus of variations, maximum principle, predictions) takes
+G, w and their derivatives from here.
 """
 
 from __future__ import annotations

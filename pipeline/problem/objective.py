@@ -14,11 +14,11 @@ from pipeline.problem.secondary import Secondary
 
 @dataclass(frozen=True)
 class Objective:
-    """A sum of integrals with `weights` [1 / the integral's unit] by their names in the catalogue (`integrals.py`), as in
+    """A sum of integrals by their names in the catalogue (`integrals.py`), `weights` in 1 over their units, as in
     Objective({"kinetic_energy": 0.3, "torque": 0.7}).
 
-    What `secondary` gains is taken off (Pontryagin report eq. (13) with the sign that maximises it). Weights of zero are
-    dropped. Raises InputError for an unknown name or a weight that is negative or not finite.
+    What `secondary` gains is taken off (Pontryagin report eq. (13) with the sign that maximises it). Weights of zero
+    are dropped. Raises InputError for an unknown name or a weight that is negative or not finite.
     """
 
     weights: Mapping[str, float] = field(default_factory=lambda: {"kinetic_energy": 1.0})

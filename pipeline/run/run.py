@@ -13,6 +13,7 @@ from pipeline.common.versions import versions
 from pipeline.common.workers import Workers
 from pipeline.config.run import RunConfig
 from pipeline.evaluation.evaluation import evaluate
+from pipeline.methods.method import Context
 from pipeline.run import resume
 from pipeline.run.console import Console
 from pipeline.run.solve import solve
@@ -32,7 +33,7 @@ def run(config: RunConfig, folder: Path) -> int:
         workers = Workers(config.parallel.workers, folder / UNFINISHED, config.parallel.address)
         workers.check()
     with stages("solve"), console.progress(config.name) as progress:
-        solutions, seconds = solve(problem, config, workers, progress)
+        solutions, seconds = solve(problem, config, Context(config.seed, workers, progress))
     with stages("evaluate"):
         motions = Motions(config, problem, [evaluate(problem, solution) for solution in solutions], workers)
     with stages("studies"):

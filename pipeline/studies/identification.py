@@ -32,8 +32,8 @@ from pipeline.config.compose import experiment
 from pipeline.config.documents import half_width
 from pipeline.config.methods import GlobalOptions
 from pipeline.config.studies import IdentificationConfig
-from pipeline.methods import global_planner, lsv
-from pipeline.methods.pmke import predictive
+from pipeline.methods.method import Context
+from pipeline.methods.registry import METHODS
 from pipeline.model.arm import Arm
 from pipeline.model.task import PositionTask
 from pipeline.problem.costs import integrals, velocities
@@ -57,10 +57,11 @@ class Printed:
     document: str
     place: str
     row: documents.Row
+    found: documents.Summary
 
     @property
     def motion(self) -> Key:
-        return self.row.found.experiment, self.row.found.method, self.row.found.optimum
+        return self.found.experiment, self.found.method, self.found.optimum
 
     @property
     def value(self) -> float:
@@ -129,7 +130,7 @@ def identify(arm: Arm, config: IdentificationConfig, seed: int, workers: Workers
         def residuals(unknowns: Array, motions: dict[Any, Array] = motions) -> Array:
             moved = _follow(motions, unknowns, workers)
             motions.update({key: q for key, (q, _) in moved.items()})
-            found = [moved[entry.motion][1][entry.row.found.column] for entry in fitted]
+            found = [moved[entry.motion][1][entry.found.column] for entry in fitted]
             return (np.array(found) - target) / sigma
 
         fit = least_squares(residuals, masses, method="lm", x_scale=start, diff_step=STEP, xtol=1e-6)
@@ -191,7 +192,7 @@ def _printed(config: IdentificationConfig) -> list[Printed]:
                 continue
             if not isinstance(row.found, documents.Summary) or row.between is not None:
                 raise ConfigError(f"{name}, {place.place}, {row.quantity}: masses need a number of summary.csv")
-            found.append(Printed(name, place.place, row))
+            found.append(Printed(name, place.place, row, row.found))
     return found
 
 
@@ -217,12 +218,7 @@ def _solve(wanted: Sequence[Key], masses: Array, seed: int, workers: Workers) ->
     motions = {}
     for name, method in dict.fromkeys(key[:2] for key in wanted):
         problem = _problem(name, masses)
-        if method == "lsv":
-            solutions = [lsv.solve(problem)]
-        elif method == "pmke":
-            solutions = [predictive.solve(problem)]
-        else:
-            solutions = global_planner.solve(problem, FEW, seed, workers)
+        solutions = METHODS[method](problem, FEW if method == "global" else None, Context(seed, workers))
         found = {s.optimum: s.trajectory.q for s in solutions if s.found}
         for key in wanted:
             if key[:2] == (name, method):
@@ -268,7 +264,7 @@ def _under(
     """What these masses give for every printed number; motions that are not `known` at them are found from nothing."""
     motions = known | _solve([key for key in _wanted(printed) if key not in known], masses, seed, workers)
     found = {key: quantities(_problem(key[0], masses), q) for key, q in motions.items()}
-    return [found[entry.motion][entry.row.found.column] for entry in printed]
+    return [found[entry.motion][entry.found.column] for entry in printed]
 
 
 def _residuals(printed: Sequence[Printed], before: list[float], after: list[float]) -> pd.DataFrame:
@@ -305,7 +301,7 @@ def draw(found: Identification, title: str) -> Figure:
         ("residual_printed", "lsv", "printed masses", "x"),
         ("residual_identified", "global", "identified masses", "o"),
     ):
-        axes.plot(numbers[column], place, marker, color=style.METHOD_COLORS[method], markersize=5, label=label)
+        axes.plot(numbers[column], place, marker, color=style.color(method), markersize=5, label=label)
     axes.set_xscale("symlog", linthresh=2.0)
     axes.set_yticks(place, _labels(numbers), fontsize=7.5)
     axes.set_ylim(-0.8, len(numbers) - 0.2)

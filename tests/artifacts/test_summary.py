@@ -7,15 +7,13 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-import yaml
 
 from pipeline.artifacts import summary as tables
 from pipeline.artifacts import sweep
 from pipeline.artifacts.report import Report
 from pipeline.common.arrays import Array
-from pipeline.config import run as config
+from pipeline.config.documents import Printed, printed_for
 from pipeline.config.run import RunConfig
-from pipeline.config.studies import PublishedConfig
 from pipeline.evaluation.evaluation import Evaluation, evaluate
 from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Solution, Status, Trajectory
@@ -24,9 +22,7 @@ from tests.support import ROOT
 
 Make = Callable[[int, int], Problem]
 EXPERIMENTS = sorted((ROOT / "conf" / "experiment").glob("*.yaml"))
-PUBLISHED = PublishedConfig(
-    document="A paper", note="A note.", values={"lsv": {"kinetic_energy_integral": 1e-3, "singular_time": 6.5}}
-)
+PRINTED = Printed({"lsv": {"kinetic_energy_integral": 1e-3, "singular_time": 6.5}}, "A paper", "A note.")
 
 
 @pytest.fixture
@@ -46,8 +42,9 @@ def motions(asked: Problem, guess: Callable[[Problem], Array]) -> list[Evaluatio
 
 
 @pytest.fixture
-def report(asked: Problem, motions: list[Evaluation]) -> Report:
-    made = report_of(asked, motions, settings=RunConfig(name="mine", published=PUBLISHED))
+def report(asked: Problem, motions: list[Evaluation], monkeypatch: pytest.MonkeyPatch) -> Report:
+    monkeypatch.setattr(tables, "printed_for", lambda name: PRINTED)
+    made = report_of(asked, motions, settings=RunConfig(name="mine"))
     return replace(made, seconds={"lsv": 0.5, "global": 2.5})
 
 
@@ -83,8 +80,7 @@ def test_printed_values_stand_beside_the_first_optimum_of_their_method(summary: 
 @pytest.mark.parametrize("file", EXPERIMENTS, ids=lambda file: file.stem)
 def test_every_printed_number_has_a_column_to_compare_it_with(file: Path, summary: pd.DataFrame) -> None:
     """A misspelt column would silently compare nothing."""
-    printed = yaml.safe_load(file.read_text(encoding="utf-8")).get("published", {}).get("values", {})
-    for method, values in printed.items():
+    for method, values in printed_for(file.stem).values.items():
         assert set(values) <= set(summary.columns), method
 
 
@@ -166,10 +162,12 @@ def test_a_sweep_without_any_summary_writes_nothing(tmp_path: Path) -> None:
     assert [file.name for file in tmp_path.iterdir()] == ["0_run"]
 
 
-def test_a_printed_zero_or_an_unknown_column_is_no_crash(asked: Problem, motions: list[Evaluation]) -> None:
+def test_a_printed_zero_or_an_unknown_column_is_no_crash(
+    asked: Problem, motions: list[Evaluation], monkeypatch: pytest.MonkeyPatch
+) -> None:
     values = {"lsv": {"torque_integral": 0.0, "nonsense": 1.0}}
-    published = config.check({"published": {"values": values}}).published
-    report = report_of(asked, motions, settings=RunConfig(published=published))
+    monkeypatch.setattr(tables, "printed_for", lambda name: Printed(values))
+    report = report_of(asked, motions, settings=RunConfig())
     with np.errstate(divide="ignore"):
         assert np.isnan(tables.summary(report)["difference_nonsense"][0])
         assert "printed 0" in tables.text(report)

@@ -12,6 +12,7 @@ from pydrake.autodiffutils import ExtractGradient, InitializeAutoDiff
 
 from pipeline.common.arrays import Array
 from pipeline.path.timing import ConstantSpeed
+from pipeline.problem.costs import integrals
 from pipeline.problem.limits import Limits
 from pipeline.problem.objective import Objective
 from pipeline.problem.problem import Boundary, Problem
@@ -44,7 +45,8 @@ def make(problem: Make, guess: Guess) -> Callable[..., Program]:
         asked, changes = problem(3, intervals), dict(KINDS[kind])
         if "timing" in changes:
             changes["reference"] = replace(asked.reference, timing=changes.pop("timing"))
-        return transcribe(replace(asked, **changes), asked.times, guess(asked))
+        stated = replace(asked, **changes)
+        return transcribe(stated, asked.times, guess(stated))
 
     return build
 
@@ -123,6 +125,36 @@ def test_cost_and_rows_are_what_the_unknowns_mean(made: Program, rng: np.random.
         POSITION_SCALE * (np.diff(q, axis=0) - made.dt[:, None] * qd),
         atol=1e-12,
     )
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_unknown_starts_at_the_guess(make: Callable[..., Program], kind: str) -> None:
+    """Velocities and torques are those of the guess, whatever term made them, and the objective is 1 there."""
+    made = make(kind)
+    x, program = made.drake.initial_guess(), made.drake
+    q = x[: made.y.size].reshape(26, 3) / POSITION_SCALE
+    np.testing.assert_allclose(q, made.guess.q, rtol=1e-12)
+    for binding in [*program.linear_equality_constraints()[:1], *program.generic_constraints()]:
+        np.testing.assert_allclose(program.EvalBinding(binding, x), 0.0, atol=1e-8)
+    assert program_value(made, x)[0] == pytest.approx(1.0, rel=1e-9)
+
+
+def test_a_bound_on_any_integral_binds(problem: Problem, guess: Guess) -> None:
+    """Less than the optimum of the kinetic energy has of each: recomputed from the joint motion alone."""
+    asked = problem(3, 12)
+    q = transcribe(asked, asked.times, guess(asked)).solve()[0]
+    free = integrals(asked, asked.times, q).integrals
+    for name in ("velocity_norm", "torque"):
+        bound = 0.97 * free[name]
+        stated = replace(asked, bounds_of_integrals={name: bound})
+        bounded, outcome, _ = transcribe(stated, stated.times, q).solve()
+        assert outcome.converged, name
+        step = np.diff(bounded, axis=0) / np.diff(asked.times)[:, None]
+        change = np.diff(np.vstack([np.zeros(3), step]), axis=0) / np.diff(asked.times)[:, None]
+        tau = asked.task.arm.inverse_dynamics(bounded[1:], step, change)
+        found = ((step if name == "velocity_norm" else tau) ** 2).sum(axis=1) @ np.diff(asked.times)
+        assert found == pytest.approx(bound, rel=1e-6)
+        assert integrals(asked, asked.times, bounded).integrals["kinetic_energy"] > free["kinetic_energy"]
 
 
 @pytest.mark.parametrize("number", [2, 3])

@@ -37,24 +37,24 @@ Run = Callable[..., Answer]
 
 def call(
     monkeypatch: pytest.MonkeyPatch,
-    capfd: pytest.CaptureFixture[str],
+    capfd: pytest.CaptureFixture[str] | None,
     *words: str,
     entry: Callable[[], int] = __main__.main,
 ) -> Answer:
-    """The command line within this process: no imports to wait for."""
+    """The command line within this process: no imports to wait for. What it prints is lost without `capfd`."""
     monkeypatch.setenv("HYDRA_FULL_ERROR", "0")  # main() sets it; this puts it back
     monkeypatch.setattr(session, "exit_code", 0)
     monkeypatch.setattr(sys, "argv", ["pipeline", *words])
     GlobalHydra.instance().clear()
-    capfd.readouterr()
+    if capfd is not None:
+        capfd.readouterr()
     try:
         code = entry()
     except SystemExit as leaving:
         code = int(leaving.code or 0)
     finally:
         GlobalHydra.instance().clear()
-    captured = capfd.readouterr()
-    return Answer(code, captured.out, captured.err)
+    return Answer(code, *(capfd.readouterr() if capfd is not None else ("", "")))
 
 
 @pytest.fixture
@@ -97,6 +97,10 @@ REFUSED = {
     "robot option": (["robot=unknown"], ["robot", "unknown", "planar3r", "planar3r_printed"]),
     "boundary option": (["boundary=closed"], ["boundary", "closed", "cyclic", "fixed", "free"]),
     "experiment": (["+experiment=traj9"], ["experiment", "traj9", "traj1", "traj4", "sim1"]),
+    "hidden option": (["robot=_common"], ["robot = _common", "no such option", "allowed: panda, planar3r"]),
+    "hidden experiment": (["-m", "+experiment=sim1,_sim"], ["experiment = _sim", "no such option"]),
+    "closest option": (["robot=pandda"], ["robot = pandda", "did you mean panda?"]),
+    "plus forgotten": (["experiment=traj3"], ["experiment=traj3", "did you mean +experiment=traj3?"]),
     "group": (["paths=line"], ["paths", "did you mean path"]),
     "key": (["sed=2"], ["sed", "did you mean seed", "methods"]),
     "appended key": (["+sed=2"], ["sed", "did you mean seed", "methods"]),
@@ -105,6 +109,25 @@ REFUSED = {
     "key of the option": (["path=circle", "path.length=0.2"], ["path.length", "radius", "center_direction"]),
     "deep key": (["method.pmke.horizn=2"], ["method.pmke.horizn", "did you mean horizon", "update_interval"]),
     "method": (["methods=[lsv,gobal]"], ["methods", "gobal", "pmke", "global", "dynamic_programming"]),
+    "one method's group": (["method=global"], ["method = global", "methods=[global]"]),
+    "some methods' groups": (["method=[lsv,pmke]"], ["method = lsv, pmke", "methods=[lsv, pmke]"]),
+    "deleted key": (["~methods"], ["~methods", "deleted"]),
+    "deleted group": (["~robot"], ["~robot", "deleted"]),
+    "deleted option": (["~robot=planar3r"], ["~robot=planar3r", "deleted"]),
+    "deleted methods": (["~method"], ["~method", "deleted"]),
+    "deleted value": (["~method.pmke.horizon"], ["~method.pmke.horizon", "deleted"]),
+    "deleted key of an option": (["path=circle", "~path.radius"], ["~path.radius", "deleted"]),
+    "old front": (["pareto.steps=3"], ["pareto.steps", "method.pareto.steps"]),
+    "old front, appended": (["+pareto.steps=3"], ["pareto", "method.pareto"]),
+    "old limits": (["method.pmke.limits=true"], ["method.pmke.limits", "methods=[receding]", "method.receding"]),
+    "old tail": (["method.pmke.tail=3"], ["method.pmke.tail", "method.receding.tail"]),
+    "old formulation": (["method.pontryagin.formulation=both"], ["formulation", "methods=[pontryagin_as_printed]"]),
+    "old step": (["+method.pontryagin.dt=0.1"], ["method.pontryagin.dt", "method.pontryagin_as_printed.dt"]),
+    "planner of the front": (["method.pareto.planner.optimised=4"], ["planner.optimised", "method.global.optimised"]),
+    "three in a front": (
+        ["methods=[pareto]", "method.pareto.objectives=[kinetic_energy]"],
+        ["method.pareto.objectives = [kinetic_energy]", "two integrals"],
+    ),
     "no method": (["methods=[]"], ["methods", "lsv", "pmke", "global"]),
     "method twice": (["methods=[lsv,lsv]"], ["methods", "twice"]),
     "methods no list": (["methods=lsv"], ["methods", "list", "pmke"]),

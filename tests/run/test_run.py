@@ -23,10 +23,12 @@ from pipeline.config import run as schema
 from pipeline.config.compose import checked
 from pipeline.config.methods import GlobalOptions
 from pipeline.evaluation.evaluation import Evaluation, evaluate
-from pipeline.methods import global_planner, lsv
-from pipeline.methods.pmke import predictive as pmke
+from pipeline.methods.global_planner.planner import global_planner
+from pipeline.methods.lsv import lsv
+from pipeline.methods.method import Context
+from pipeline.methods.pmke.predictive import pmke
 from pipeline.problem.problem import Boundary, Problem
-from pipeline.problem.solution import Status, no_progress
+from pipeline.problem.solution import Status
 from pipeline.run.solve import solve
 from tests.run.test_main import ROOT, Answer, call, command
 from tests.support import RUN_FILES
@@ -160,7 +162,7 @@ class TestTraj3:
 def solved(number: int, method: str) -> tuple[Problem, list[Evaluation]]:
     config = configured(f"+experiment=traj{number}", f"methods=[{method}]", *FEW)
     problem = prepare(config)
-    solutions, seconds = solve(problem, config, Workers(min(2, os.cpu_count() or 1)), no_progress)
+    solutions, seconds = solve(problem, config, Context(1, Workers(min(2, os.cpu_count() or 1))))
     assert seconds[method] > 0
     return problem, [evaluate(problem, solution) for solution in solutions]
 
@@ -277,8 +279,8 @@ def test_way_points(points: Callable[[Any], Path], relative: bool) -> None:
         assert np.linalg.norm(dense - point, axis=1).min() < 1e-4
     if relative:
         np.testing.assert_allclose(problem.q_init, config.robot.q_init, atol=1e-9)
-    solutions = [lsv.solve(problem), pmke.solve(problem)]
-    solutions += global_planner.solve(problem, GlobalOptions(candidates=60, optimised=3))
+    solutions = [lsv(problem)[0], pmke(problem)[0]]
+    solutions += global_planner(problem, GlobalOptions(candidates=60, optimised=3))
     assert all(evaluate(problem, solution).status is Status.SOLVED for solution in solutions)
 
 
@@ -293,14 +295,14 @@ def test_a_path_can_say_where_it_starts() -> None:
     np.testing.assert_allclose(moved, [0.40, 0.05], atol=1e-9)
     np.testing.assert_allclose(problem.reference.position(np.zeros(1))[0], [0.40, 0.05], atol=1e-12)
     assert np.abs(problem.q_init - [0.0, 0.327, -0.754]).max() > 1e-2
-    assert evaluate(problem, lsv.solve(problem)).status is Status.SOLVED
+    assert evaluate(problem, lsv(problem)[0]).status is Status.SOLVED
 
 
 @pytest.mark.parametrize("law", ["constant_speed", "quintic", "raised_cosine"])
 def test_timing_laws_run(law: str) -> None:
     problem = prepared("+experiment=traj1", f"timing={law}", "timing.duration=10.0", "timing.steps=26")
-    solutions = [lsv.solve(problem), pmke.solve(problem)]
-    solutions += global_planner.solve(problem, GlobalOptions(candidates=60, optimised=3))
+    solutions = [lsv(problem)[0], pmke(problem)[0]]
+    solutions += global_planner(problem, GlobalOptions(candidates=60, optimised=3))
     motions = [evaluate(problem, solution) for solution in solutions]
     assert [motion.status for motion in motions] == [Status.SOLVED] * len(motions)
     costs = [motion.energy_integral_spline for motion in motions[:3]]

@@ -3,6 +3,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pipeline.common.arrays import Array
+from pipeline.model import kinematics
 from pipeline.model.task import PositionTask
 from pipeline.path.curves import Line
 from pipeline.path.reference import Reference
@@ -17,6 +19,7 @@ from pipeline.path.timing import RaisedCosine
 from pipeline.problem.costs import integrals, objective_values
 from pipeline.problem.objective import Objective
 from pipeline.problem.problem import Problem
+from pipeline.search import population as population_module
 from pipeline.search.configurations import random_configurations
 from pipeline.search.population import population, random_inverse_weights
 from pipeline.search.selection import distinct, diverse, path_distance
@@ -123,3 +126,21 @@ def test_diverse_takes_far_motions_before_near_ones() -> None:
     assert chosen[0] == 0
     assert {30, 31} <= set(chosen)
     assert set(distinct(motions, costs, 4, 1e-4, TURNS)) == {0, 1, 2, 3}  # the cheapest alone see one valley
+
+
+def test_motions_survive_where_the_inertia_weighted_one_is_lost(problem: Make, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first motion of every start may meet a singularity before the others do."""
+    lost = []
+
+    def project(*arguments: Any, **options: Any) -> tuple[Array, Array]:
+        q, error = kinematics.project(*arguments, **options)
+        if not lost:
+            error[0] = np.inf
+        lost.append(len(q))
+        return q, error
+
+    monkeypatch.setattr(population_module, "project", project)
+    stated = problem(1, 4)
+    found = population(stated, stated.times, stated.q_init[None], 5, np.random.default_rng(0))
+    assert lost == [5, 4, 4, 4]
+    assert found.shape == (4, 5, 3)
