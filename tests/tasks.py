@@ -38,7 +38,7 @@ def calls(folder: Path) -> list[float]:
 
 def kept(store: Path) -> list[Path]:
     """What is finished there: a hidden file is one that was begun."""
-    return sorted(store.glob("[!.]*.pickle"))
+    return sorted(store.glob("[!.]*.result"))
 
 
 def in_pairs(context: Context, item: float) -> float:

@@ -1,6 +1,7 @@
 """Work on a running Dask cluster. Its workers need this project in the same versions, but not our files.
 
-A task carries everything it needs, so that the cluster can repeat it elsewhere when a worker is lost.
+A task carries everything it needs, so that the cluster can repeat it elsewhere when a worker is lost. It is a pickle: who
+may reach the scheduler may run code on its workers, as with every Dask cluster. Results come back as plain numbers.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import threading
 from collections.abc import Generator, Sequence
 from typing import Any
 
+from pipeline.common import kept
 from pipeline.common.errors import ConfigError
 from pipeline.common.versions import stamp
 
@@ -46,7 +48,7 @@ def check(address: str) -> None:
 
 
 def run(address: str, function: Any, context: Any, items: Sequence[Any]) -> Generator[tuple[int, bytes], None, None]:
-    """(index, pickled function(context, item)) for all items, in the order in which they finish."""
+    """(index, function(context, item) as `kept` writes it) for all items, in the order in which they finish."""
     check(address)
     from distributed import Client, as_completed
     from distributed.client import FutureCancelledError
@@ -73,4 +75,4 @@ def _task(task: bytes, versions: str) -> bytes:
         raise ConfigError(f"parallel.address: a worker has other versions ({stamp()}) than this process ({versions})")
     with _solving, threadpool_limits(1):
         function, context, item = pickle.loads(task)
-        return pickle.dumps(function(context, item))
+        return kept.dumps(function(context, item))

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from pipeline.config.fields import Switch, Text, Whole, WordOrVector, Words, build, schema
+from pipeline.config.fields import Name, Switch, Text, Whole, WordOrVector, Words, build, schema
 from pipeline.config.goal import BoundaryConfig, KineticEnergyConfig, LimitsConfig, ObjectiveConfig
 from pipeline.config.methods import MethodConfig, MethodName
 from pipeline.config.path import CircleConfig, LineConfig, TimingConfig, WaypointsConfig
@@ -43,7 +43,7 @@ class SweepConfig:
 class RunConfig:
     """Everything that one run needs."""
 
-    name: Annotated[Text, Field(description="of the experiment: names the folder under outputs/")] = "run"
+    name: Annotated[Name, Field(description="of the experiment: names the folder under outputs/")] = "run"
     methods: Annotated[Words[MethodName], Field(description="which methods run, in this order")] = (
         "lsv",
         "pmke",

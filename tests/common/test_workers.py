@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import pickle
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +10,7 @@ import pandas as pd
 import pytest
 
 from pipeline.build.problem import prepare
+from pipeline.common import kept as stored
 from pipeline.common import workers as workers_module
 from pipeline.common.workers import Workers
 from pipeline.config import run as config
@@ -96,7 +96,7 @@ def spoilt(content: bytes, how: str) -> bytes:
         return content[: len(content) // 2]
     if how == "foreign":
         return b"something else\n" * 10
-    at = content.index(np.float64(7.5).tobytes())  # one bit within the numbers: still a good pickle
+    at = content.index(np.float64(7.5).tobytes())  # one bit within the numbers: still a good array
     return content[:at] + bytes([content[at] ^ 1]) + content[at + 1 :]
 
 
@@ -178,7 +178,7 @@ def test_a_killed_run_goes_on(
 
     killed = tmp_path / "killed"
     run_and_kill(killed, 3, *words, f"hydra.run.dir={killed}", cwd=tmp_path)
-    finished = [pickle.loads(file.read_bytes()) for file in kept(killed / UNFINISHED)]
+    finished = [stored.loads(file.read_bytes()) for file in kept(killed / UNFINISHED)]
     assert not list(killed.glob("*.csv"))
     assert not list(killed.glob("*.parquet"))
     assert not list(killed.glob("*.rrd"))
