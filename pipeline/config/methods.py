@@ -200,5 +200,5 @@ class MethodConfig:
     pontryagin_as_printed: PontryaginAsPrintedOptions = PontryaginAsPrintedOptions()
 
     def of(self, name: str) -> Any:
-        """The options of the method `name`."""
-        return getattr(self, "global_" if name == "global" else name)
+        """The options of the method `name`; None for one that has none."""
+        return getattr(self, "global_" if name == "global" else name, None)
