@@ -105,7 +105,7 @@ def test_second_derivatives_are_differences_of_the_first(arm: Arm, rng: np.rando
     compare(found.by_q_q, by_q_q, 1e-8)
     whole, cheap = energy(chain, q, qd), energy(chain, q, qd, second=False)
     np.testing.assert_array_equal(whole.by_q, cheap.by_q)
-    assert cheap.mass is None
+    assert not cheap.mass.size
 
 
 def test_the_exact_derivatives_equal_drakes_autodiff(spatial: Arm, rng: np.random.Generator) -> None:

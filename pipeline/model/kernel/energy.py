@@ -22,16 +22,19 @@ from pipeline.common.arrays import Array
 from pipeline.model.kernel.chain import Chain, Places, cross, outward
 
 
+NONE = np.empty((0, 0, 0))
+
+
 @dataclass(frozen=True)
 class Energy:
-    """T (K,) [J], by_q, by_qd (K, n); and where they were asked for M, P = d2T/dqd dq, Q = d2T/dq dq (K, n, n)."""
+    """T (K,) [J], by_q, by_qd (K, n); M, mixed P = d2T/dqd dq, by_q_q = d2T/dq dq (K, n, n), empty where not asked for."""
 
     value: Array
     by_q: Array
     by_qd: Array
-    mass: Array | None = None
-    mixed: Array | None = None
-    by_q_q: Array | None = None
+    mass: Array = NONE
+    mixed: Array = NONE
+    by_q_q: Array = NONE
 
 
 @dataclass(frozen=True)

@@ -116,7 +116,6 @@ class Motions:
     def _lagrangian(self, q: Array, qd: Array, at: Places) -> tuple[Array, ...]:
         """L (K,), dL/dq, dL/dqd (K, n), M, P, Q (K, n, n)."""
         found = energy(self.chain, q, qd, at=at)
-        assert found.mass is not None and found.mixed is not None and found.by_q_q is not None
         parts = (found.value, found.by_q, found.by_qd, found.mass, found.mixed, found.by_q_q)
         if self.inertia == 1.0 and not self.norm:
             return parts

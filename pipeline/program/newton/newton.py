@@ -15,8 +15,10 @@ Each iteration serves all starts and all knots with one call of the kernel.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline.common.arrays import Array
 from pipeline.problem.limits import Limits
@@ -53,8 +55,8 @@ class Answer:
 
     q: Array
     cost: Array
-    converged: Array
-    iterations: Array
+    converged: NDArray[np.bool_]
+    iterations: NDArray[np.int_]
     residual: Array
 
 
@@ -62,7 +64,7 @@ class Answer:
 class State(PerStart):
     """One iterate of every start: unknowns, slacks and multipliers of limits, the barrier, the filter."""
 
-    number: Array
+    number: NDArray[np.int_]
     x: Array
     begin: Array
     scale: Array
@@ -71,10 +73,10 @@ class State(PerStart):
     mu: Array
     seen_theta: Array
     seen_phi: Array
-    short: Array
+    short: NDArray[np.int_]
     point: Point
 
-    def take(self, rows: Array) -> State:
+    def take(self, rows: NDArray[Any]) -> State:
         point, self.point = self.point, self.number  # type: ignore[assignment]
         part = super().take(rows)
         part.point, self.point = point.take(rows), point
@@ -198,17 +200,17 @@ class Newton:
         positive[:, :, -1] += 1e-4 * positive[:, :, -1].mean(axis=1, keepdims=True)
         return self.band.solve(matrices, positive, right)[0]
 
-    def _converged(self, state: State, step: Step, tolerance: float) -> Array:
+    def _converged(self, state: State, step: Step, tolerance: float) -> NDArray[np.bool_]:
         done = (step.decrement < tolerance) & (np.abs(state.point.error).max(axis=(1, 2)) < ON_PATH)
         if self.bounds:
             gap = np.abs(state.slack * state.z - state.mu[:, None]).max(axis=1)
             lack = np.abs(self.bounds.values(state.x, state.begin) - state.slack).max(axis=1)
             done &= (gap < COMPLEMENTARITY * BARRIER_END) & (state.mu <= BARRIER_END) & (lack < FEASIBLE)
-        return np.asarray(done)
+        return done
 
     # --- the step -----------------------------------------------------------------------------------------------
 
-    def _advance(self, state: State, step: Step, last: Array) -> State:
+    def _advance(self, state: State, step: Step, last: NDArray[np.bool_]) -> State:
         """The next iterate. The whole next point is computed at once, since full steps are the rule."""
         towards = np.maximum(0.99, 1 - state.mu)
         reach = _fraction(state.slack, step.slack, towards) if self.bounds else np.ones(len(state.x))
@@ -247,7 +249,7 @@ class Newton:
         short = np.where(alpha < SHORT, state.short + 1, 0)
         return State(state.number, trial, state.begin, state.scale, slack, z, mu, theta, phi, short, point)
 
-    def _refused(self, state: State, step: Step, alpha: Array, trial: Array, cost: Array, error: Array) -> Array:
+    def _refused(self, state: State, step: Step, alpha: Array, trial: Array, cost: Array, error: Array) -> NDArray[Any]:
         """Whether a trial neither lowers cost nor what is missed, against the iterate and against its filter."""
         theta, phi = np.abs(error).sum(axis=(1, 2)), cost * state.scale
         if self.bounds:
