@@ -36,11 +36,18 @@ _PUBLIC = {
     "Solution": "pipeline.problem.solution",
     "Status": "pipeline.problem.solution",
     "Trajectory": "pipeline.problem.solution",
+    "Context": "pipeline.methods.method",
+    "METHODS": "pipeline.methods.registry",
     "lsv": "pipeline.methods.lsv",
+    "inertia_weighted": "pipeline.methods.lsv",
     "pmke": "pipeline.methods.pmke.predictive",
-    "global_planner": "pipeline.methods.global_planner",
+    "receding": "pipeline.methods.pmke.receding",
+    "global_planner": "pipeline.methods.global_planner.planner",
+    "pareto": "pipeline.methods.pareto",
     "dynamic_programming": "pipeline.methods.dynamic_programming",
-    "calculus_of_variations": "pipeline.methods.calculus_of_variations",
+    "calculus_of_variations": "pipeline.methods.calculus_of_variations.stationary",
+    "pontryagin": "pipeline.methods.pontryagin.boundary_value",
+    "pontryagin_as_printed": "pipeline.methods.pontryagin.as_printed",
     "Boundary": "pipeline.problem.problem",
     "Limits": "pipeline.problem.limits",
     "Objective": "pipeline.problem.objective",
@@ -53,5 +60,4 @@ __all__ = sorted(_PUBLIC)
 def __getattr__(name: str) -> Any:
     if name not in _PUBLIC:
         raise AttributeError(f"module 'pipeline' has no attribute '{name}'")
-    module = importlib.import_module(_PUBLIC[name])
-    return module if _PUBLIC[name].startswith("pipeline.methods.") else getattr(module, name)
+    return getattr(importlib.import_module(_PUBLIC[name]), name)

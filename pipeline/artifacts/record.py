@@ -16,7 +16,6 @@ from scipy.spatial.transform import Rotation
 from pipeline.common.files import write_beside
 from pipeline.config.run import RunConfig
 from pipeline.evaluation.evaluation import Evaluation
-from pipeline.problem.solution import Solution
 from pipeline.studies.studies import NOTHING, Extras
 
 
@@ -42,21 +41,22 @@ def write_run(
     folder: Path,
     config: RunConfig,
     facts: Mapping[str, Any],
-    results: Sequence[tuple[list[Solution], float]],
+    seconds: Mapping[str, float],
     evaluations: Sequence[Evaluation],
     stages: Mapping[str, float],
     extras: Extras = NOTHING,
 ) -> None:
     """run.json: versions, seed, statistics of every solve, timings per stage, machine, the configuration."""
     solved = [
-        {"method": s.method, "optimum": s.optimum, "status": e.status.word, "statistics": s.statistics}
-        for s, e in zip([s for solutions, _ in results for s in solutions], evaluations, strict=True)
+        {"method": e.method, "optimum": s.optimum, "status": e.status.word, "statistics": s.statistics}
+        for e in evaluations
+        for s in (e.solution,)
     ]
     content = {
         **facts,
         "cpu_count": os.cpu_count(),
         "stages_s": dict(stages),
-        "methods_s": {solutions[0].method: seconds for solutions, seconds in results},
+        "methods_s": dict(seconds),
         "solutions": solved,
         **sent_facts(extras),
         "config": asdict(config),

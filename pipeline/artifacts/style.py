@@ -4,31 +4,7 @@ from __future__ import annotations
 
 import colorsys
 
-METHOD_COLORS = {
-    "lsv": "#D9601A",
-    "inertia_weighted": "#0E7490",
-    "pmke": "#2B6CB0",
-    "global": "#2F855A",
-    "calculus_of_variations": "#6B46C1",
-    "dynamic_programming": "#5A6472",
-    "pontryagin": "#C53030",
-    "pontryagin_as_printed": "#B7791F",
-    "pareto": "#2F855A",
-}
-
-
-METHOD_NAMES = {
-    "lsv": "LSV",
-    "inertia_weighted": "Inertia-weighted",
-    "pmke": "PMKE",
-    "global": "Global optimum",
-    "calculus_of_variations": "Calculus of variations",
-    "dynamic_programming": "Dynamic programming",
-    "pontryagin": "Pontryagin",
-    "pontryagin_as_printed": "Pontryagin, as printed",
-    "pareto": "Pareto point",
-}
-
+from pipeline.methods.registry import METHODS
 
 # Joints 1, 2, 3 are blue, red and yellow in the papers; the others keep apart from them and from one another.
 JOINT_COLORS = ("#1F5FBF", "#C62828", "#D9A400", "#2E8B57", "#7B3FA0", "#00838F", "#8D5524", "#D81B7A", "#5A6472")
@@ -52,7 +28,7 @@ def color(label: str) -> str:
     if method == "pareto":
         hue = 0.62 - 0.62 * min(1.0, (optimum - 1) / FRONT)
         return "#" + "".join(f"{round(255 * channel):02X}" for channel in colorsys.hsv_to_rgb(hue, 0.75, 0.75))
-    base = METHOD_COLORS.get(method, UNKNOWN)
+    base = METHODS[method].color if method in METHODS else UNKNOWN
     keep = max(0.75 ** (optimum - 1), 0.35)
     channels = (int(base[i : i + 2], 16) for i in (1, 3, 5))
     return "#" + "".join(f"{round(255 - keep * (255 - channel)):02X}" for channel in channels)
@@ -62,7 +38,8 @@ def name(label: str) -> str:
     """The name of a motion for legends and titles: `Global optimum 2`."""
     method, optimum = _split(label)
     numbered = optimum > 1 or method == "pareto"
-    return METHOD_NAMES.get(method, method) + (f" {optimum}" if numbered else "")
+    title = METHODS[method].title if method in METHODS else method
+    return title + (f" {optimum}" if numbered else "")
 
 
 def joint_color(joint: int) -> str:

@@ -22,7 +22,7 @@ REACTIONS = {"reaction_force", "reaction_torque"}
 def place(problem: Problem, config: RunConfig) -> Problem:
     """The problem on the base that `config` asks for; raises ConfigError if they do not go together."""
     wanted = {key for key, weight in config.objective.weights.items() if weight}
-    wanted |= set(config.pareto.objectives) if "pareto" in config.methods else set()
+    wanted |= set(config.method.pareto.objectives) if "pareto" in config.methods else set()
     free = isinstance(config.base, FreeBaseConfig)
     if "base_rotation" in wanted and not free:
         raise ConfigError("base_rotation: the base does not move; set base=free")
@@ -36,6 +36,8 @@ def place(problem: Problem, config: RunConfig) -> Problem:
         spacecraft = Spacecraft(held=True)
     else:
         return problem
+    if config.closed_loop.run:
+        raise ConfigError("closed_loop.run: the controller is one for arms on a fixed base")
     if problem.objective.secondary is not None:
         raise ConfigError("objective.secondary: secondary criteria are for arms on a fixed base")
     if np.any(problem.task.arm.gravity) and free:

@@ -2,24 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from typing import Any
 
-from pipeline.config.fields import choice, choices, count, number, part, switch
+from pipeline.config.fields import choice, choices, count, number, part
 from pipeline.config.goal import INTEGRALS
-
-METHODS = (
-    "lsv",
-    "inertia_weighted",
-    "pmke",
-    "global",
-    "dynamic_programming",
-    "calculus_of_variations",
-    "pontryagin",
-    "pareto",
-)
-
-
-DEFAULT_METHODS = ("lsv", "pmke", "global")
 
 
 @dataclass(frozen=True)
@@ -42,13 +29,23 @@ class PmkeOptions:
     horizon: int = count(2)
     update_interval: float = number(0.5, above=0, unit="s")
     objective: str = choice("problem", "problem", "kinetic_energy", "torque")
-    limits: bool = switch(False)
-    tail: int = count(8, low=0)
     interpolation: str = choice("quintic", "quintic", "cubic")
     gain: float = number(0.0, low=0, unit="1/s")
     tolerance: float = number(1e-8, above=0)
     singular_value: float = number(0.03, above=0)
     max_drift: float = number(0.01, above=0, unit="m")
+
+
+@dataclass(frozen=True)
+class RecedingOptions:
+    """PMKE with limits: a receding horizon whose knots are executed as they are."""
+
+    prediction_step: float = number(1.0, above=0, unit="s")
+    horizon: int = count(2)
+    update_interval: float = number(0.5, above=0, unit="s")
+    objective: str = choice("problem", "problem", "kinetic_energy", "torque")
+    tail: int = count(8, low=0)
+    tolerance: float = number(1e-8, above=0)
 
 
 @dataclass(frozen=True)
@@ -90,16 +87,34 @@ class CalculusOfVariationsOptions:
 
 @dataclass(frozen=True)
 class PontryaginOptions:
-    """The maximum principle: as the report prints it, and its correct two-point boundary-value problem."""
+    """The maximum principle as the two-point boundary-value problem that it is."""
 
-    formulation: str = choice("boundary_value", "as_printed", "boundary_value", "both")
-    dt: float = number(0.01, above=0, unit="s")
-    max_drift: float = number(0.1, above=0, unit="m")
     guesses: int = count(24)
     intervals: int = count(40, low=4)
     tolerance: float = number(1e-9, above=0)
     max_nodes: int = count(20000, low=10)
     same_path: float = number(0.01, above=0, unit="rad")
+
+
+@dataclass(frozen=True)
+class PontryaginAsPrintedOptions:
+    """The maximum principle as the report prints it, integrated as it stands."""
+
+    dt: float = number(0.01, above=0, unit="s")
+    max_drift: float = number(0.1, above=0, unit="m")
+
+
+@dataclass(frozen=True)
+class ParetoOptions:
+    """The front of two integrals; `planner` finds its extremes and its first motions."""
+
+    method: str = choice("epsilon_constraint", "epsilon_constraint", "weighting")
+    objectives: list[str] = choices(INTEGRALS[:2], *INTEGRALS)
+    steps: int = count(10, low=2)
+    rounds: int = count(3, low=0)
+    tolerance: float = number(1e-8, above=0)
+    max_iterations: int = count(200)
+    planner: GlobalOptions = part(GlobalOptions)
 
 
 @dataclass(frozen=True)
@@ -109,19 +124,20 @@ class MethodConfig:
     lsv: LsvOptions = part(LsvOptions)
     inertia_weighted: LsvOptions = part(LsvOptions)
     pmke: PmkeOptions = part(PmkeOptions)
+    receding: RecedingOptions = part(RecedingOptions)
     global_: GlobalOptions = part(GlobalOptions)
+    pareto: ParetoOptions = part(ParetoOptions)
     dynamic_programming: DynamicProgrammingOptions = part(DynamicProgrammingOptions)
     calculus_of_variations: CalculusOfVariationsOptions = part(CalculusOfVariationsOptions)
     pontryagin: PontryaginOptions = part(PontryaginOptions)
+    pontryagin_as_printed: PontryaginAsPrintedOptions = part(PontryaginAsPrintedOptions)
+
+    def of(self, name: str) -> Any:
+        """The options of the method `name`."""
+        return getattr(self, "global_" if name == "global" else name)
 
 
-@dataclass(frozen=True)
-class ParetoOptions:
-    """Pareto front of two integrals: method `pareto`."""
+METHODS = tuple(field.name.rstrip("_") for field in fields(MethodConfig))
 
-    method: str = choice("epsilon_constraint", "epsilon_constraint", "weighting")
-    objectives: list[str] = choices(INTEGRALS[:2], *INTEGRALS)
-    steps: int = count(10, low=2)
-    rounds: int = count(3, low=0)
-    tolerance: float = number(1e-8, above=0)
-    max_iterations: int = count(200)
+
+DEFAULT_METHODS = ("lsv", "pmke", "global")

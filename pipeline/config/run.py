@@ -21,7 +21,7 @@ from pipeline.config.goal import (
     VelocityNormConfig,
     WeightedConfig,
 )
-from pipeline.config.methods import DEFAULT_METHODS, METHODS, MethodConfig, ParetoOptions
+from pipeline.config.methods import DEFAULT_METHODS, METHODS, MethodConfig
 from pipeline.config.path import CircleConfig, LineConfig, TimingConfig, WaypointsConfig
 from pipeline.config.robot import FixedBaseConfig, FreeBaseConfig, ObstaclesConfig, RobotConfig
 from pipeline.config.studies import (
@@ -79,7 +79,6 @@ class RunConfig:
     method: MethodConfig = part(MethodConfig)
     parallel: ParallelConfig = part(ParallelConfig)
     sweep: SweepConfig = part(SweepConfig)
-    pareto: ParetoOptions = part(ParetoOptions)
     candidate_study: CandidateStudyConfig = part(CandidateStudyConfig)
     export: ExportConfig = part(ExportConfig)
     closed_loop: ClosedLoopConfig = part(ClosedLoopConfig)

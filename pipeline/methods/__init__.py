@@ -1,1 +1,1 @@
-"""One file per method; each answers solve(problem, options) with one Solution or several."""
+"""One file or folder per method; each answers method(problem, options, context) with its solutions (`registry.py`)."""

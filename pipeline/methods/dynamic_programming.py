@@ -16,12 +16,11 @@ from typing import Any
 import numpy as np
 
 from pipeline.common.arrays import Array
-from pipeline.common.errors import InputError
 from pipeline.config.methods import DynamicProgrammingOptions
+from pipeline.methods.method import Context, Method, Serves
 from pipeline.model.kinematics import wrap
-from pipeline.problem.lagrangian import Lagrangian
 from pipeline.problem.problem import Boundary, Problem
-from pipeline.problem.solution import Progress, Solution, Status, Trajectory, no_progress
+from pipeline.problem.solution import Solution, Status, Trajectory
 from pipeline.search.grid import Grid, Index, make_grid
 from pipeline.search.selection import distinct
 
@@ -31,15 +30,12 @@ TRACKING = 1e-10  # [m] what every node keeps
 STRIDE = 8  # first spacing, in nodes, of the starts that a cyclic problem is solved from
 
 
-def solve(
-    problem: Problem, options: DynamicProgrammingOptions = DynamicProgrammingOptions(), progress: Progress = no_progress
-) -> list[Solution]:
+def solve(problem: Problem, options: DynamicProgrammingOptions, context: Context) -> list[Solution]:
     """Distinct grid optima on the grid's own knots, best first; the first is the global one, with its grid error.
 
     Torque and power limits are not part of a first-order grid: with them the costs are those of a relaxed problem.
     """
     times = _intervals(problem, options.intervals)
-    check(problem)
     grid = make_grid(problem, times, options.nodes, options.velocity_slack)
     motions, costs = paths(grid, problem.boundary)
     kept = _distinct(problem, motions, costs, options.same_path)
@@ -47,7 +43,7 @@ def solve(
         standing = np.tile(problem.q_init, (len(times), 1))
         message = "no path through the grid keeps the limits; more nodes or fewer intervals make it finer than them"
         return [Solution("dynamic_programming", Trajectory(times, standing), Status.INFEASIBLE, message, found=False)]
-    progress(1, 1, float(costs[kept[0]]))
+    context.progress(1, 1, float(costs[kept[0]]))
     log: dict[str, Any] = {**_errors(grid, problem.boundary, float(costs[kept[0]])), "spacing_rad": grid.spacing}
     log["loops"] = [len(layer.loops) for layer in grid.layers]
     return [
@@ -64,17 +60,14 @@ def solve(
     ]
 
 
-def check(problem: Problem) -> None:
-    """Refuse problems that this method does not serve; raises InputError."""
-    if problem.task.redundancy != 1:
-        raise InputError(f"dynamic_programming: the redundancy degree is {problem.task.redundancy}; supported is r = 1")
-    if problem.objective.torque or not Lagrangian(problem.task, problem.objective).is_quadratic:
-        raise InputError(
-            "dynamic_programming needs an objective of first order, such as the kinetic energy; a torque integral is not one"
-        )
-    ends = problem.reference.position(np.array([0.0, problem.reference.duration]))
-    if problem.boundary is Boundary.CYCLIC and np.linalg.norm(ends[1] - ends[0]) > 1e-9:
-        raise InputError("boundary cyclic: the path does not end where it starts")
+dynamic_programming = Method(
+    "dynamic_programming",
+    "Dynamic programming",
+    "#5A6472",
+    DynamicProgrammingOptions,
+    Serves(redundancy=1, order=1, moving_base=False),
+    solve,
+)
 
 
 def starts(problem: Problem, times: Array, nodes: int = 180, same_path: float = 0.2) -> Array:
@@ -82,7 +75,6 @@ def starts(problem: Problem, times: Array, nodes: int = 180, same_path: float = 
 
     A velocity limit may be exceeded by one node spacing per step: the solver that starts here will keep it.
     """
-    check(problem)
     motions, costs = paths(make_grid(problem, times, nodes, velocity_slack=1.0), problem.boundary)
     return motions[_distinct(problem, motions, costs, same_path)]
 

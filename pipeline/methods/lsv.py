@@ -12,17 +12,29 @@ import numpy as np
 
 from pipeline.common.arrays import Array
 from pipeline.config.methods import LsvOptions
+from pipeline.methods.method import ANY, Context, Method
 from pipeline.methods.singularity import SingularityWatch
 from pipeline.model.kinematics import least_velocity
 from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Solution, Trajectory
 
 
-def solve(problem: Problem, options: LsvOptions = LsvOptions(), method: str = "lsv") -> Solution:
-    """Integrate from q_init with steps of options.dt; a singular configuration on the way is reported with its time.
+def solve(problem: Problem, options: LsvOptions, context: Context) -> list[Solution]:
+    """Integrate the least-squares velocities from q_init; a singular configuration on the way is reported with its time."""
+    return [_integrate("lsv", problem, options, weighted=False)]
 
-    method: lsv or inertia_weighted.
-    """
+
+def solve_weighted(problem: Problem, options: LsvOptions, context: Context) -> list[Solution]:
+    """The same with the velocities of least kinetic energy."""
+    return [_integrate("inertia_weighted", problem, options, weighted=True)]
+
+
+lsv = Method("lsv", "LSV", "#D9601A", LsvOptions, ANY, solve)
+inertia_weighted = Method("inertia_weighted", "Inertia-weighted", "#0E7490", LsvOptions, ANY, solve_weighted)
+
+
+def _integrate(method: str, problem: Problem, options: LsvOptions, *, weighted: bool) -> Solution:
+    """From q_init with steps of options.dt."""
     task, reference = problem.task, problem.reference
     steps = max(1, round(reference.duration / options.dt))
     time = np.linspace(0.0, reference.duration, steps + 1)
@@ -32,7 +44,7 @@ def solve(problem: Problem, options: LsvOptions = LsvOptions(), method: str = "l
 
     def velocity(i: int, q: Array, jacobian: Array, correction: Array) -> Array:
         watch.see(time[i], jacobian @ task.arm.motion_map(q[None])[0])
-        inverse = least_velocity(task.arm, q[None], jacobian[None], weighted=method == "inertia_weighted")[0]
+        inverse = least_velocity(task.arm, q[None], jacobian[None], weighted=weighted)[0]
         drift = task.arm.follow(q[None], np.zeros_like(q[None]))[0]  # of a base that has momentum
         return np.asarray(
             inverse @ (task.velocity(q[None], xd_ref[i : i + 1])[0] + correction - jacobian @ drift) + drift

@@ -17,15 +17,15 @@ from scipy.cluster.hierarchy import fcluster, linkage
 from scipy.spatial.distance import squareform
 
 from pipeline.common.arrays import Array
-from pipeline.common.workers import Workers
-from pipeline.config.methods import GlobalOptions, ParetoOptions
-from pipeline.methods import global_planner
-from pipeline.methods.global_planner import TRACKING
+from pipeline.config.methods import ParetoOptions
+from pipeline.methods.global_planner.optimum import stays_on_path
+from pipeline.methods.global_planner.planner import TRACKING, global_planner
+from pipeline.methods.method import ANY, Context, Method
 from pipeline.problem.costs import integrals
 from pipeline.problem.limits import LIMIT_KINDS
 from pipeline.problem.objective import IntegralBounds, Objective
 from pipeline.problem.problem import Problem
-from pipeline.problem.solution import Progress, Solution, Status, Trajectory, no_progress
+from pipeline.problem.solution import Solution, Status, Trajectory
 from pipeline.program.program import Transcription
 from pipeline.search.selection import path_distance
 
@@ -59,14 +59,7 @@ class Point:
         return self.weights[0] * self.values[0] + self.weights[1] * self.values[1]
 
 
-def solve(
-    problem: Problem,
-    options: ParetoOptions,
-    planner: GlobalOptions,
-    seed: int = 1,
-    workers: Workers = Workers(),
-    progress: Progress = no_progress,
-) -> list[Solution]:
+def solve(problem: Problem, options: ParetoOptions, context: Context) -> list[Solution]:
     """The front's motions, from the first extreme to the second. The first's statistics hold `front`, a row per point."""
     first, second = options.objectives
     known: list[Array] = []
@@ -76,7 +69,7 @@ def solve(
         objective = _only(own)
         if own == VANISHING and other in found:
             objective = _kept_unique(own, other, found[other], options)
-        optima = global_planner.solve(replace(problem, objective=objective), planner, seed, workers, progress)
+        optima = global_planner(replace(problem, objective=objective), options.planner, context)
         if optima[0].status is not Status.SOLVED:
             message = f"the extreme of {own} was not found: {optima[0].message or optima[0].status.value}"
             return [replace(optima[0], method="pareto", message=message)]
@@ -90,17 +83,13 @@ def solve(
     if not np.all(worst - best > IMPROVED * np.abs(best)):
         return _report(problem, extremes, options)  # one motion is best in both: there is nothing to trade
     between = replace(problem, objective=_weighted(options, 1 / (worst - best)))
-    known += [
-        s.trajectory.q
-        for s in global_planner.solve(between, planner, seed, workers, progress)
-        if s.status is Status.SOLVED
-    ]
+    known += [s.trajectory.q for s in global_planner(between, options.planner, context) if s.status is Status.SOLVED]
 
     points = _points(options, best, worst)
-    points = _try(problem, options, points, [(i, q) for i in range(len(points)) for q in known], workers, progress)
+    points = _try(problem, options, points, [(i, q) for i in range(len(points)) for q in known], context)
     for _ in range(options.rounds):
         pairs = _neighbours(points)
-        improved = _try(problem, options, points, pairs, workers, progress)
+        improved = _try(problem, options, points, pairs, context)
         gained = any(
             new.cost < old.cost * (1 - IMPROVED) or new.converged > old.converged
             for new, old in zip(improved, points, strict=True)
@@ -109,6 +98,17 @@ def solve(
         if not gained:
             break
     return _report(problem, [extremes[0], *points, extremes[1]], options)
+
+
+def refuses(problem: Problem, options: ParetoOptions) -> str | None:
+    """Two integrals make a front, and the planner must serve each of them."""
+    if len(options.objectives) != 2:
+        return f"method.pareto.objectives = [{', '.join(options.objectives)}]: a front is one of two integrals"
+    each = (replace(problem, objective=_only(name)) for name in options.objectives)
+    return next((why for own in each if (why := global_planner.why_not(own, options.planner))), None)
+
+
+pareto = Method("pareto", "Pareto point", "#2F855A", ParetoOptions, ANY, solve, refuses)
 
 
 def _points(options: ParetoOptions, best: Array, worst: Array) -> list[Point]:
@@ -145,32 +145,31 @@ def _try(
     options: ParetoOptions,
     points: list[Point],
     pairs: list[tuple[int, Array]],
-    workers: Workers,
-    progress: Progress,
+    context: Context,
 ) -> list[Point]:
     """Solve point i from motion q for all pairs (i, q); keep the better motion of each."""
     best = list(points)
 
     def done(count: int, found: Point) -> None:
-        progress(count, len(pairs), found.cost)
+        context.progress(count, len(pairs), found.cost)
 
     items = [(replace(points[i], q=None, values=(np.inf, np.inf)), q) for i, q in pairs]
-    for (i, _), found in zip(pairs, workers.map(_solve_point, (problem, options), items, done), strict=True):
+    for (i, _), found in zip(pairs, context.workers.map(_solve_point, (problem, options), items, done), strict=True):
         better = found.converged and (not best[i].converged or found.cost < best[i].cost * (1 - 1e-12))
         if better or best[i].q is None:
             best[i] = found
     return best
 
 
-def _solve_point(context: tuple[Problem, ParetoOptions], item: tuple[Point, Array]) -> Point:
-    (problem, options), (point, guess) = context, item
+def _solve_point(shared: tuple[Problem, ParetoOptions], item: tuple[Point, Array]) -> Point:
+    (problem, options), (point, guess) = shared, item
     bounds = IntegralBounds() if point.bounded is None else IntegralBounds(**{point.bounded: point.bound})
     objective = _objective(options, point.weights)
     stated = replace(problem, objective=objective, integral_bounds=bounds)
     q, outcome, _ = Transcription(stated, problem.times, guess).solve(
         tolerance=options.tolerance, max_iterations=options.max_iterations
     )
-    converged = outcome.converged and global_planner.stays_on_path(problem, problem.times, q)
+    converged = outcome.converged and stays_on_path(problem, problem.times, q)
     return replace(point, q=q, values=_values(problem, options, q), converged=converged, status=outcome.status)
 
 

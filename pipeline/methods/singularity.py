@@ -10,6 +10,12 @@ from pipeline.common.arrays import Array
 from pipeline.problem.solution import Solution, Status, Trajectory
 
 
+def singular_value_ratio(jacobian: Array) -> Array:
+    """The smallest singular value of J (..., m, n) over the largest (...)."""
+    values = np.linalg.svd(jacobian, compute_uv=False)
+    return np.asarray(values[..., -1] / values[..., 0])
+
+
 class SingularityWatch:
     """Follows the smallest singular value of J, relative to the largest, and reports where it was too small."""
 
@@ -17,8 +23,7 @@ class SingularityWatch:
         self.threshold, self.max_drift, self.time, self.smallest = threshold, max_drift, 0.0, np.inf
 
     def see(self, time: float, jacobian: Array) -> None:
-        values = np.linalg.svd(jacobian, compute_uv=False)
-        ratio = float(values[-1] / values[0])
+        ratio = float(singular_value_ratio(jacobian))
         if ratio < self.smallest:
             self.time, self.smallest = float(time), ratio
 

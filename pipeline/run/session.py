@@ -37,7 +37,7 @@ class Session(Callback):
     def check(self, asked: RunConfig) -> None:
         """Raise InputError if the job cannot be done."""
         from pipeline.common.workers import Workers
-        from pipeline.run.run import state
+        from pipeline.run.solve import state
 
         state(asked)
         Workers(address=asked.parallel.address).check()

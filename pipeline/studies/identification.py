@@ -29,8 +29,8 @@ from pipeline.config.compose import experiment
 from pipeline.config.documents import half_width
 from pipeline.config.methods import GlobalOptions
 from pipeline.config.studies import IdentificationConfig
-from pipeline.methods import global_planner, lsv
-from pipeline.methods.pmke import predictive
+from pipeline.methods.method import Context
+from pipeline.methods.registry import METHODS
 from pipeline.model.arm import Arm
 from pipeline.model.task import PositionTask
 from pipeline.problem.costs import integrals, velocities
@@ -198,12 +198,7 @@ def _solve(wanted: Sequence[Key], masses: Array, seed: int, workers: Workers) ->
     motions = {}
     for name, method in dict.fromkeys(key[:2] for key in wanted):
         problem = _problem(name, masses)
-        if method == "lsv":
-            solutions = [lsv.solve(problem)]
-        elif method == "pmke":
-            solutions = [predictive.solve(problem)]
-        else:
-            solutions = global_planner.solve(problem, FEW, seed, workers)
+        solutions = METHODS[method](problem, FEW if method == "global" else None, Context(seed, workers))
         found = {s.optimum: s.trajectory.q for s in solutions if s.found}
         for key in wanted:
             if key[:2] == (name, method):

@@ -26,7 +26,7 @@ def draw(found: Identification, name: str) -> Figure:
         ("residual_printed", "lsv", "printed masses", "x"),
         ("residual_identified", "global", "identified masses", "o"),
     ):
-        axes.plot(numbers[column], place, marker, color=style.METHOD_COLORS[method], markersize=5, label=label)
+        axes.plot(numbers[column], place, marker, color=style.color(method), markersize=5, label=label)
     axes.set_xscale("symlog", linthresh=2.0)
     axes.set_yticks(place, _labels(numbers), fontsize=7.5)
     axes.set_ylim(-0.8, len(numbers) - 0.2)

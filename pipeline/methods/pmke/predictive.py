@@ -2,8 +2,8 @@
 
 Every update interval I the kinetic-energy integral over the next h knots, Delta T apart, is minimised (eq. (4)); the
 pseudoinverse follows the path while the null space follows the predicted joint motion (eq. (2), step 7). An objective of
-other terms of first order (`lagrangian.py`) takes the kinetic energy's place, and squared torques if asked for; with
-`limits` the window keeps them and its knots are executed (`receding.py`).
+other terms of first order (`problem/lagrangian.py`) takes the kinetic energy's place, and squared torques if asked for.
+Limits and obstacles are not seen: `receding.py` is for them.
 """
 
 from __future__ import annotations
@@ -17,7 +17,8 @@ from scipy.interpolate import BSpline, make_interp_spline
 
 from pipeline.common.arrays import Array
 from pipeline.config.methods import PmkeOptions
-from pipeline.methods.pmke import receding
+from pipeline.methods.method import ANY, Context, Method
+from pipeline.methods.pmke.prediction import path_weight, rollout, solve_window, window_objective
 from pipeline.methods.pmke.window import Window
 from pipeline.methods.singularity import SingularityWatch
 from pipeline.model.kinematics import least_velocity, project
@@ -28,10 +29,15 @@ from pipeline.problem.solution import Solution, Status, Trajectory
 from pipeline.program import ipopt
 
 
-def solve(problem: Problem, options: PmkeOptions = PmkeOptions()) -> Solution:
+def solve(problem: Problem, options: PmkeOptions, context: Context) -> list[Solution]:
     """Steps 1-10 of Table 1 from q_init. Statistics hold one entry per prediction: time, wall time, iterations, status."""
-    if options.limits:
-        return receding.solve(problem, options)
+    return [_follow(problem, options)]
+
+
+pmke = Method("pmke", "PMKE", "#2B6CB0", PmkeOptions, ANY, solve)
+
+
+def _follow(problem: Problem, options: PmkeOptions) -> Solution:
     task, reference, arm = problem.task, problem.reference, problem.task.arm
     dt, duration = options.dt, reference.duration
     steps = max(1, round(duration / dt))
@@ -86,7 +92,7 @@ class _Predictor:
     def __init__(self, problem: Problem, options: PmkeOptions, horizon: int) -> None:
         self.task, self.reference, self.options, self.horizon = problem.task, problem.reference, options, horizon
         self.step = min(options.prediction_step, problem.reference.duration)
-        self.objective = receding.window_objective(problem, options)
+        self.objective = window_objective(problem, options.objective)
         lagrangian = Lagrangian(problem.task, self.objective)
         # The small program knows objectives of first order, and no momentum.
         self.lifted = options.objective == "torque" or bool(problem.task.arm.base_coordinates)
@@ -144,7 +150,7 @@ class _Predictor:
             obstacles=None,
             times=times,
         )
-        result = receding.solve_window(window, times, np.vstack([q, guess]), self.options.tolerance)
+        result = solve_window(window, times, np.vstack([q, guess]), self.options.tolerance)
         return result[0][1:], *result[1:]
 
     def _guesses(self, q: Array, x_ref: Array, knots: Array) -> list[Array]:
@@ -152,12 +158,12 @@ class _Predictor:
 
         A guess that repeats q can converge to a motion wound by 2 pi; neither of these does.
         """
-        guesses = [receding.rollout(self.problem, q, x_ref)]
+        guesses = [rollout(self.problem, q, x_ref)]
         if self.previous is not None:
             times, points = self.previous
             # Beyond its end the previous motion is at rest: the last roll-out step carries it on.
             shifted = np.array([np.interp(knots, times, column) for column in points.T]).T
-            weight = receding.path_weight(self.task.arm, shifted)
+            weight = path_weight(self.task.arm, shifted)
             moved, left = project(self.task, shifted, x_ref, weight, tolerance=1e-6)
             if np.all(left < 1e-3):
                 guesses.append(moved)

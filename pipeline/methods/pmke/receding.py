@@ -1,11 +1,11 @@
 """PMKE with limits, for any first-order or torque objective: a receding horizon on the planner's own lifted program.
 
 Every update interval the motion over the next h knots is optimised from the present position and velocity, within the
-position, velocity, torque and power limits and clear of the obstacles (`transcription.py`); its first knots are executed
-as they are, so that the executed motion keeps the limits at its knots. A few coarse knots carry the window on to the end
-of the path: a horizon alone runs into dead ends, where the limits leave no way on.
-Before anything moves
-the global planner makes a rough plan of the whole, from which the first window starts. If a later window has no solution, the rest of the last plan is followed; when that is used up too, the method gives up and says
+position, velocity, torque and power limits and clear of the obstacles (`program/program.py`); its first knots are
+executed as they are, so that the executed motion keeps the limits at its knots. A few coarse knots carry the window on to
+the end of the path: a horizon alone runs into dead ends, where the limits leave no way on.
+Before anything moves the global planner makes a rough plan of the whole, from which the first window starts. If a later
+window has no solution, the rest of the last plan is followed; when that is used up too, the method gives up and says
 where.
 """
 
@@ -20,24 +20,19 @@ import numpy as np
 from scipy.interpolate import make_interp_spline
 
 from pipeline.common.arrays import Array
-from pipeline.config.methods import GlobalOptions, PmkeOptions
-from pipeline.methods import global_planner
-from pipeline.methods.singularity import SingularityWatch
-from pipeline.model.arm import Arm
+from pipeline.config.methods import GlobalOptions, RecedingOptions
+from pipeline.methods.global_planner.planner import global_planner
+from pipeline.methods.method import ANY, Context, Method
+from pipeline.methods.pmke.prediction import path_weight, rollout, solve_window, window_objective
+from pipeline.methods.singularity import singular_value_ratio
 from pipeline.model.kinematics import project
-from pipeline.problem.costs import objective_values
 from pipeline.problem.limits import LIMIT_KINDS
 from pipeline.problem.objective import Objective
 from pipeline.problem.problem import Boundary, Problem
 from pipeline.problem.solution import Solution, Status, Trajectory
-from pipeline.program import ipopt
 from pipeline.program.feasibility import least_violation
-from pipeline.program.program import Transcription
 
 TRACKING = 1e-6  # [m]
-
-
-MOST_ITERATIONS = 120
 
 
 PLAN_INTERVALS = 24  # of the plan that is made before anything moves
@@ -46,44 +41,20 @@ PLAN_INTERVALS = 24  # of the plan that is made before anything moves
 FIRST_STARTS = (16, 48)  # of that plan: more if so many find no motion
 
 
-def window_objective(problem: Problem, options: PmkeOptions) -> Objective:
-    """What a window minimises: the problem's objective, or the one that the options name."""
-    own = {"kinetic_energy": Objective(), "torque": Objective(0.0, 1.0)}
-    return own.get(options.objective, problem.objective)
+def solve(problem: Problem, options: RecedingOptions, context: Context) -> list[Solution]:
+    """From q_init on knots options.prediction_step apart. Statistics: one entry per update, as of `pmke`."""
+    return [_follow(problem, options)]
 
 
-def solve_window(
-    problem: Problem, times: Array, guess: Array, tolerance: float
-) -> tuple[Array, float, ipopt.Outcome, int]:
-    """The motion (h + 1, n) of least objective from problem.q_init and qd_init over the knots `times`; guess (h + 1, n)."""
-    program = Transcription(problem, times, guess)
-    q, outcome, iterations = program.solve(tolerance=tolerance, max_iterations=MOST_ITERATIONS)
-    return q, float(objective_values(problem, times, q[None])[0]), outcome, iterations
+receding = Method("receding", "PMKE with limits", "#5B7FDB", RecedingOptions, ANY, solve)
 
 
-def rollout(problem: Problem, q: Array, targets: Array) -> Array:
-    """The inertia-weighted pseudoinverse's motion (K, n) from q (n,) through targets (K, m)."""
-    rows, at = [], q[None]
-    for target in targets:
-        at, _ = project(problem.task, at, target[None], problem.task.arm.inverse_inertia(at), tolerance=1e-9)
-        rows.append(at[0])
-    return np.array(rows)
-
-
-def path_weight(arm: Arm, q: Array) -> Array | None:
-    """For `project` from q (K, n): least joint displacements, the base following them; None: it stands still."""
-    joints = arm.n - arm.base_coordinates
-    return arm.lift(q, np.tile(np.eye(joints), (len(q), 1, 1))) if arm.base_coordinates else None
-
-
-def solve(problem: Problem, options: PmkeOptions) -> Solution:
-    """From q_init on knots options.prediction_step apart. Statistics: one entry per update, as in `pmke.py`."""
-    task, duration = problem.task, problem.reference.duration
+def _follow(problem: Problem, options: RecedingOptions) -> Solution:
+    duration = problem.reference.duration
     count = max(1, round(duration / options.prediction_step))
     times = np.linspace(0.0, duration, count + 1)
     every = max(1, round(options.update_interval / (duration / count)))
-    watch = SingularityWatch(options.singular_value, TRACKING)
-    objective = window_objective(problem, options)
+    objective = window_objective(problem, options.objective)
     q = np.tile(problem.q_init, (count + 1, 1))
     plan, why_not = _first_plan(problem, objective)
     if plan is None:
@@ -108,8 +79,6 @@ def solve(problem: Problem, options: PmkeOptions) -> Solution:
             q[i : last + 1] = found[: last + 1 - i]
         elif planned < min(i + every, count):
             return _given_up(_why(window), options, times, q[: i + 1], log)
-    for moment, jacobian in zip(times, task.jacobian(q), strict=True):
-        watch.see(moment, jacobian)
     failed = sum(not entry["converged"] for entry in log)
     message = f"{failed} of {len(log)} windows had no solution: the plan before was followed there" if failed else ""
     statistics = {
@@ -117,10 +86,10 @@ def solve(problem: Problem, options: PmkeOptions) -> Solution:
         "horizon": options.horizon,
         "update_interval": every * duration / count,
         "predictions": log,
-        "smallest_singular_value_ratio": watch.smallest,
+        "smallest_singular_value_ratio": float(singular_value_ratio(problem.task.jacobian(q)).min()),
     }
     return Solution(
-        "pmke",
+        "receding",
         Trajectory(times, q),
         Status.SOLVED,
         message,
@@ -135,7 +104,7 @@ def _first_plan(problem: Problem, objective: Objective) -> tuple[Callable[[Array
     times = np.linspace(0.0, problem.reference.duration, PLAN_INTERVALS + 1)
     whole = replace(problem, times=times, objective=objective, boundary=Boundary.FIXED)
     for starts in FIRST_STARTS:
-        first = global_planner.solve(whole, GlobalOptions(optimised=starts))[0]
+        first = global_planner(whole, GlobalOptions(optimised=starts))[0]
         if first.found:
             return _through(times, first.trajectory.q), ""
     return None, first.message
@@ -152,7 +121,7 @@ def _through(times: Array, q: Array) -> Callable[[Array], Array]:
 
 
 def _update(
-    window: Problem, plan: Callable[[Array], Array], options: PmkeOptions
+    window: Problem, plan: Callable[[Array], Array], options: RecedingOptions
 ) -> tuple[Array | None, dict[str, Any]]:
     """One window: the motion found from the plan, or else from a roll-out, or None; and what is known of the update."""
     begin = clock.perf_counter()
@@ -180,10 +149,10 @@ def _update(
     return (best[0] if best[2].converged else None), entry
 
 
-def _given_up(message: str, options: PmkeOptions, times: Array, done: Array, log: list[dict[str, Any]]) -> Solution:
+def _given_up(message: str, options: RecedingOptions, times: Array, done: Array, log: list[dict[str, Any]]) -> Solution:
     q = np.vstack([done, np.tile(done[-1], (len(times) - len(done), 1))])
     statistics = {"predictions": log, "update_interval": options.update_interval}
-    return Solution("pmke", Trajectory(times, q), Status.INFEASIBLE, message, statistics=statistics, found=False)
+    return Solution("receding", Trajectory(times, q), Status.INFEASIBLE, message, statistics=statistics, found=False)
 
 
 def _why(window: Problem) -> str:

@@ -1,4 +1,9 @@
-"""The maximum principle as the Pontryagin report prints it (eqs (21), (22)), integrated as it stands."""
+"""The maximum principle as the Pontryagin report prints it, integrated as it stands.
+
+Eqs (21), (22), Euler steps from lambda(0) = 2 J+ xd, the transversality condition eq. (12) taken at the start. It belongs
+to the end where q is free: with q(0) given, (I - J+J) lambda(T) = 0 and lambda(0) is unknown (`boundary_value.py`). The
+report also adds k0 w to what it minimises, so that w is made small.
+"""
 
 from __future__ import annotations
 
@@ -6,15 +11,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.config.methods import PontryaginOptions
-from pipeline.methods.pontryagin.conditions import rates, transversality
+from pipeline.config.methods import PontryaginAsPrintedOptions
+from pipeline.methods.method import Context, Method
+from pipeline.methods.pontryagin.conditions import SERVES, rates, transversality
 from pipeline.model.kinematics import pseudoinverse
 from pipeline.problem.lagrangian import Lagrangian
 from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Solution, Status, Trajectory
 
 
-def as_printed(problem: Problem, options: PontryaginOptions = PontryaginOptions()) -> list[Solution]:
+def solve(problem: Problem, options: PontryaginAsPrintedOptions, context: Context) -> list[Solution]:
     """Eqs (21), (22) from q_init with steps of options.dt, on those times."""
     objective = problem.objective
     if objective.secondary is not None:
@@ -45,3 +51,8 @@ def as_printed(problem: Problem, options: PontryaginOptions = PontryaginOptions(
             statistics={"steps": steps, "final_error": gap, "transversality_end": left},
         )
     ]
+
+
+pontryagin_as_printed = Method(
+    "pontryagin_as_printed", "Pontryagin, as printed", "#B7791F", PontryaginAsPrintedOptions, SERVES, solve
+)

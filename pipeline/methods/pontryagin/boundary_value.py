@@ -1,11 +1,7 @@
-"""Pontryagin's maximum principle: the report's algorithm as printed, and the two-point problem that it should have solved.
+"""Pontryagin's maximum principle as a two-point boundary-value problem, by collocation from many guesses.
 
-as_printed: eqs (21), (22), Euler steps from lambda(0) = 2 J+ xd, the transversality condition eq. (12) taken at the
-start. It belongs to the end where q is free: with q(0) given, (I - J+J) lambda(T) = 0 and lambda(0) is unknown. The
-report also adds k0 w to what it minimises, so that w is made small.
-
-boundary_value: `maximum_principle.py` on [0, T] with lambda(T) = 0 (the multiplier's part may be chosen so) and q(0)
-given, or x(q(0)) = x_ref(0) and (I - J+J) lambda(0) = 0 for a free start, by collocation from many guesses.
+The conditions of `conditions.py` on [0, T] with lambda(T) = 0 (the multiplier's part may be chosen so) and q(0) given, or
+x(q(0)) = x_ref(0) and (I - J+J) lambda(0) = 0 for a free start.
 """
 
 from __future__ import annotations
@@ -19,16 +15,14 @@ from scipy.integrate import solve_bvp
 from scipy.interpolate import CubicSpline
 
 from pipeline.common.arrays import Array
-from pipeline.common.errors import InputError
-from pipeline.common.workers import Workers
 from pipeline.config.methods import PontryaginOptions
-from pipeline.methods.pontryagin.conditions import costates, null_space, rates, transversality
+from pipeline.methods.method import Context, Method
+from pipeline.methods.pontryagin.conditions import SERVES, costates, null_space, rates, transversality
 from pipeline.methods.pontryagin.second_variation import morse_index
 from pipeline.model.kinematics import project, pseudoinverse
-from pipeline.model.task import PoseTask
 from pipeline.problem.lagrangian import Lagrangian
 from pipeline.problem.problem import Boundary, Problem
-from pipeline.problem.solution import Progress, Solution, Status, Trajectory, no_progress
+from pipeline.problem.solution import Solution, Status, Trajectory
 from pipeline.search.configurations import starting_points
 from pipeline.search.population import population, ranking
 from pipeline.search.selection import distinct, diverse
@@ -57,21 +51,6 @@ ASTRAY = 0.5  # [rad] between a coarsely integrated shot and the path: the shot 
 LARGEST = 1e8  # a Newton step may go far astray; Drake must not see what is not finite
 
 
-def check(problem: Problem) -> None:
-    """Refuse problems that this method does not serve; raises InputError."""
-    supported = (
-        "supported are objectives of first order, boundary free or fixed, positions only, and no limits or obstacles"
-    )
-    if problem.objective.torque or not Lagrangian(problem.task, problem.objective).is_quadratic:
-        raise InputError(f"pontryagin: the objective holds a torque integral; {supported}")
-    if problem.boundary is Boundary.CYCLIC:
-        raise InputError(f"pontryagin: the boundary is cyclic; {supported}")
-    if problem.constrained:
-        raise InputError(f"pontryagin: the problem has limits or obstacles; {supported}")
-    if isinstance(problem.task, PoseTask):
-        raise InputError(f"pontryagin: the task prescribes orientations; {supported}")
-
-
 @dataclass(frozen=True)
 class _Extremal:
     """One solution of the boundary-value problem: the collocation's own mesh t (K,), y = [q; lambda] (2 n, K)."""
@@ -82,28 +61,22 @@ class _Extremal:
     statistics: dict[str, Any]
 
 
-def boundary_value(
-    problem: Problem,
-    options: PontryaginOptions = PontryaginOptions(),
-    seed: int = 1,
-    workers: Workers = Workers(),
-    progress: Progress = no_progress,
-) -> list[Solution]:
+def solve(problem: Problem, options: PontryaginOptions, context: Context) -> list[Solution]:
     """Every extremal found, least objective first, on problem.times. Statistics: `integral`, the objective in continuous
     time, `transversality_start` and `_end`, `kind` (minimum or saddle) and `index`.
     """
-    guesses = _guesses(problem, options, np.random.default_rng(seed))
+    guesses = _guesses(problem, options, np.random.default_rng(context.seed))
     best = np.inf
 
     def done(count: int, found: _Extremal) -> None:
         nonlocal best
         if found.converged:
             best = min(best, found.statistics["integral"])
-        progress(count, len(guesses), best)
+        context.progress(count, len(guesses), best)
 
-    rough = workers.map(_solve, (problem, ROUGH_TOLERANCE, ROUGH_NODES), list(guesses), done)
+    rough = context.workers.map(_solve, (problem, ROUGH_TOLERANCE, ROUGH_NODES), list(guesses), done)
     basins = _distinct(problem, rough, 5 * options.same_path)
-    fine = workers.map(_polish, (problem, options.tolerance, options.max_nodes), basins)
+    fine = context.workers.map(_polish, (problem, options.tolerance, options.max_nodes), basins)
     extremals = _distinct(problem, fine, options.same_path)
     if not extremals:
         standing = np.tile(problem.q_init, (len(problem.times), 1))
@@ -123,6 +96,9 @@ def boundary_value(
         )
         for rank, found in enumerate(extremals)
     ]
+
+
+pontryagin = Method("pontryagin", "Pontryagin", "#C53030", PontryaginOptions, SERVES, solve)
 
 
 def _guesses(problem: Problem, options: PontryaginOptions, rng: np.random.Generator) -> Array:
@@ -179,16 +155,16 @@ def _shots(problem: Problem, times: Array, starts: Array, rng: np.random.Generat
     return on_path.reshape(motions.shape)[good]
 
 
-def _solve(context: tuple[Problem, float, int], guess: Array) -> _Extremal:
-    problem, tolerance, nodes = context
+def _solve(shared: tuple[Problem, float, int], guess: Array) -> _Extremal:
+    problem, tolerance, nodes = shared
     times = np.linspace(0.0, problem.reference.duration, len(guess))
     qd = CubicSpline(times, guess)(times, 1)
     costate = costates(Lagrangian(problem.task, problem.objective), times, guess, qd)
     return _collocate(problem, times, np.vstack([guess.T, costate.T]), tolerance, nodes)
 
 
-def _polish(context: tuple[Problem, float, int], found: _Extremal) -> _Extremal:
-    problem, tolerance, nodes = context
+def _polish(shared: tuple[Problem, float, int], found: _Extremal) -> _Extremal:
+    problem, tolerance, nodes = shared
     fine = _collocate(problem, found.t, found.y, tolerance, nodes)
     if not fine.converged:
         return fine

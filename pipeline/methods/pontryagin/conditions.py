@@ -15,8 +15,18 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.common.arrays import Array
+from pipeline.methods.method import Serves
 from pipeline.model.kinematics import weighted_pseudoinverse
 from pipeline.problem.lagrangian import Lagrangian
+from pipeline.problem.problem import Boundary
+
+SERVES = Serves(
+    order=1,
+    boundaries=frozenset((Boundary.FIXED, Boundary.FREE)),
+    constraints=False,
+    orientation=False,
+    moving_base=False,
+)
 
 
 def rates(lagrangian: Lagrangian, xd: Array, q: Array, costate: Array) -> tuple[Array, Array]:

@@ -1,14 +1,7 @@
 """Every stationary motion of the kinetic-energy integral, by the calculus of variations (r = 1, no limits).
 
-Or of any other integral of first order, L = 1/2 qd' G qd - k0 w (`lagrangian.py`): G then stands for M, and the gradient
-of k0 w joins n.
-
-With a multiplier lambda(t) for the task J qdd = xdd - Jd qd, Lagrange's equations of T = 1/2 qd' M qd are
-M qdd + n = J' lambda, hence
-
-    qdd = J_M+ (xdd - Jd qd) - (I - J_M+ J) M^-1 n,   J_M+ = M^-1 J' (J M^-1 J')^-1.
-
-The Global paper (after Nedungadi and Kazerouinian) prints a plus sign and no inverse of M. At a free end the momentum
+Or of any other integral of first order, L = 1/2 qd' G qd - k0 w (`problem/lagrangian.py`), G then standing for M.
+They are extremals (`extremals.py`) that also meet the condition of their ends. At a free end the momentum
 has no component along the self-motion, t' M qd = 0 with t the unit null vector of J; for a path at rest that is qd = 0.
 One unknown remains, the point on the initial self-motion manifold (free) or the initial null-space speed (fixed start):
 it is scanned, all starts integrated at once, and every sign change of t' M qd at T is refined to a root.
@@ -24,16 +17,16 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.integrate import DOP853
 from scipy.optimize import elementwise
 
 from pipeline.common.arrays import Array
-from pipeline.common.errors import InputError
 from pipeline.config.methods import CalculusOfVariationsOptions
-from pipeline.model.kinematics import pseudoinverse, wrap
+from pipeline.methods.calculus_of_variations.extremals import MOST_STEPS, initial_state, integrate
+from pipeline.methods.method import Context, Method, Serves
+from pipeline.model.kinematics import wrap
 from pipeline.problem.lagrangian import Lagrangian
 from pipeline.problem.problem import Boundary, Problem
-from pipeline.problem.solution import Progress, Solution, Status, Trajectory, no_progress
+from pipeline.problem.solution import Solution, Status, Trajectory
 from pipeline.search.self_motion import manifold, on_manifold, tangent
 
 TRACKING = 1e-10  # [m]
@@ -46,9 +39,6 @@ NEAR_MISS = 0.05  # of the residual's scale
 
 
 VARIATION = 1e-5  # [rad or rad/s] of the unknown, for the Jacobi field
-
-
-MOST_STEPS = 300
 
 
 MOST_SCAN_STEPS = 80  # a regular motion takes 15 to 30 at the scan's tolerance
@@ -70,15 +60,10 @@ class _Family:
     closed: bool
 
 
-def solve(
-    problem: Problem,
-    options: CalculusOfVariationsOptions = CalculusOfVariationsOptions(),
-    progress: Progress = no_progress,
-) -> list[Solution]:
+def solve(problem: Problem, options: CalculusOfVariationsOptions, context: Context) -> list[Solution]:
     """All stationary motions on problem.times, cheapest first. Their statistics: `integral`, the objective in continuous
     time, `kind` (minimum or saddle), `index`, `unknown` [rad or rad/s] and `residual` t' M qd at T.
     """
-    check(problem)
     found: list[tuple[_Family, float]] = []
     near: list[tuple[float, float]] = []
     families = _families(problem, options)
@@ -87,7 +72,7 @@ def solve(
         for root in _roots(problem, family, unknowns, values, ends, options):
             found.append((family, root))
         near += _near_misses(unknowns, values)
-        progress(number + 1, len(families), float("nan"))
+        context.progress(number + 1, len(families), float("nan"))
     motions = [motion for family in families for motion in _motions(problem, family, found, options)]
     motions.sort(key=lambda motion: float(motion.statistics["integral"]))
     if not motions:
@@ -111,17 +96,20 @@ def solve(
     ]
 
 
-def check(problem: Problem) -> None:
-    """Refuse problems that this method does not serve; raises InputError."""
-    supported = "supported are r = 1, an objective of first order, boundary free or fixed, and no limits or obstacles"
-    if problem.task.redundancy != 1:
-        raise InputError(f"calculus_of_variations: the redundancy degree is {problem.task.redundancy}; {supported}")
-    if problem.objective.torque or not Lagrangian(problem.task, problem.objective).is_quadratic:
-        raise InputError(f"calculus_of_variations: the objective holds a torque integral; {supported}")
-    if problem.boundary is Boundary.CYCLIC:
-        raise InputError(f"calculus_of_variations: the boundary is cyclic; {supported}")
-    if problem.constrained:
-        raise InputError(f"calculus_of_variations: the problem has limits or obstacles; {supported}")
+calculus_of_variations = Method(
+    "calculus_of_variations",
+    "Calculus of variations",
+    "#6B46C1",
+    CalculusOfVariationsOptions,
+    Serves(
+        redundancy=1,
+        order=1,
+        boundaries=frozenset((Boundary.FIXED, Boundary.FREE)),
+        constraints=False,
+        moving_base=False,
+    ),
+    solve,
+)
 
 
 def _families(problem: Problem, options: CalculusOfVariationsOptions) -> list[_Family]:
@@ -163,7 +151,7 @@ def _families(problem: Problem, options: CalculusOfVariationsOptions) -> list[_F
 def _final(problem: Problem, family: _Family, u: Array, tolerance: float, most_steps: int) -> tuple[Array, Array]:
     """Residual t' M qd (P,) [N m s] and configuration (P, n) at T; nan where the motion runs into a singularity."""
     q, qd = family.start(u)
-    state = _integrate(problem, _state(q, qd), 0.0, problem.reference.duration, tolerance, most_steps)
+    state = integrate(problem, initial_state(q, qd), 0.0, problem.reference.duration, tolerance, most_steps)
     return _residual(problem, state), state[:, : q.shape[1]]
 
 
@@ -242,10 +230,10 @@ def _motions(
     if not roots.size:
         return []
     count, n, times = len(roots), problem.task.arm.n, problem.times
-    state = _state(*family.start(np.concatenate([roots, roots + VARIATION, roots - VARIATION])))
+    state = initial_state(*family.start(np.concatenate([roots, roots + VARIATION, roots - VARIATION])))
     states = [state]
     for begin, end in pairwise(times):
-        states.append(_integrate(problem, states[-1], float(begin), float(end), options.tolerance))
+        states.append(integrate(problem, states[-1], float(begin), float(end), options.tolerance))
     residual = _residual(problem, states[-1])
     slope = (residual[count : 2 * count] - residual[2 * count :]) / (2 * VARIATION)
     history = np.stack(states, axis=1)[:, :, :n]  # (3 roots, N + 1, n)
@@ -270,76 +258,3 @@ def _motions(
         )
         for i in range(count)
     ]
-
-
-# --- integration ----------------------------------------------------------------------------------------------------
-
-
-def _state(q: Array, qd: Array) -> Array:
-    """(P, 2 n + 1): q, qd and the objective so far."""
-    return np.hstack([q, qd, np.zeros((len(q), 1))])
-
-
-def rate(problem: Problem, t: Array, state: Array) -> Array:
-    """d/dt of the states (P, 2 n + 1) at times t (P,): the stationarity condition (see the module)."""
-    task, n = problem.task, problem.task.arm.n
-    q, qd = state[:, :n], state[:, n : 2 * n]
-    lagrangian = Lagrangian(task, problem.objective)
-    jacobian, metric = task.jacobian(q), lagrangian.metric(q)
-    _, xd_ref, xdd_ref = problem.reference.sample(t)
-    wanted = task.acceleration(q, qd, xd_ref, xdd_ref) - task.jacobian_rate_term(q, qd)
-    bias, inverse = lagrangian.bias(q, qd), np.linalg.inv(metric)
-    right = inverse @ np.swapaxes(jacobian, 1, 2)
-    free = -(inverse @ bias[:, :, None])
-    multiplier = np.linalg.solve(jacobian @ right, wanted[:, :, None] - jacobian @ free)
-    qdd = (free + right @ multiplier)[:, :, 0]
-    value = 0.5 * np.einsum("ki,kij,kj->k", qd, metric, qd) - lagrangian.gain(q)[0]
-    return np.hstack([qd, qdd, value[:, None]])
-
-
-def _integrate(
-    problem: Problem, state: Array, begin: float, end: float, tolerance: float, most_steps: int = MOST_STEPS
-) -> Array:
-    """The states (P, 2 n + 1) at `end`: Dormand-Prince 8(5,3) with a step of its own for every row, all rows in step.
-
-    After each step q and qd are moved the least distance back onto the path. Rows that take too many steps become nan.
-    """
-    a, b, c = DOP853.A[:12, :12], DOP853.B, DOP853.C[:12]
-    e3, e5 = DOP853.E3[:12], DOP853.E5[:12]
-    y, t = state.copy(), np.full(len(state), begin)
-    h = np.full(len(state), min(end - begin, 0.05 * problem.reference.duration))
-    live = np.flatnonzero(np.isfinite(y).all(axis=1))
-    for _ in range(most_steps):
-        if not live.size:
-            break
-        step = np.minimum(h[live], end - t[live])[:, None]
-        slopes = np.empty((12, len(live), y.shape[1]))
-        for stage in range(12):
-            inner = y[live] + step * np.tensordot(a[stage, :stage], slopes[:stage], axes=1)
-            slopes[stage] = rate(problem, t[live] + c[stage] * step[:, 0], inner)
-        ahead = y[live] + step * np.tensordot(b, slopes, axes=1)
-        scale = tolerance * (1 + np.maximum(np.abs(y[live]), np.abs(ahead)))
-        fifth = (np.tensordot(e5, slopes, axes=1) / scale) ** 2
-        third = (np.tensordot(e3, slopes, axes=1) / scale) ** 2
-        fifth, third = fifth.mean(axis=1), third.mean(axis=1)
-        error = step[:, 0] * fifth / np.sqrt(np.maximum(fifth + 0.01 * third, 1e-300))
-        good = error <= 1
-        moved = live[good]
-        y[moved], t[moved] = ahead[good], t[moved] + step[good, 0]
-        if moved.size:
-            y[moved] = _back_on_path(problem, t[moved], y[moved])
-        h[live] = step[:, 0] * np.clip(0.9 * np.maximum(error, 1e-300) ** -0.125, 0.2, 6.0)
-        live = live[(t[live] < end - 1e-14) & (h[live] > 1e-10)]
-    y[t < end - 1e-12] = np.nan
-    return y
-
-
-def _back_on_path(problem: Problem, t: Array, state: Array) -> Array:
-    n = problem.task.arm.n
-    x_ref, xd_ref, _ = problem.reference.sample(t)
-    error, jacobian = problem.task.error_and_jacobian(state[:, :n], x_ref)
-    inverse = pseudoinverse(jacobian)
-    xd = problem.task.velocity(state[:, :n], xd_ref)
-    state[:, :n] -= (inverse @ error[:, :, None])[:, :, 0]
-    state[:, n : 2 * n] += (inverse @ (xd[:, :, None] - jacobian @ state[:, n : 2 * n, None]))[:, :, 0]
-    return state

@@ -1,0 +1,1 @@
+"""The Global Kinematic Planner: many coarse starts, each distinct optimum refined."""

@@ -1,0 +1,192 @@
+"""One local optimum: from a motion on the coarsest grid to the wanted knots, grid by grid."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from pipeline.common.arrays import Array
+from pipeline.config.methods import GlobalOptions
+from pipeline.model.clearance import Clearance, Obstacles
+from pipeline.problem.costs import SECOND_ORDER, objective_values
+from pipeline.problem.lagrangian import Lagrangian
+from pipeline.problem.objective import Objective
+from pipeline.problem.problem import Problem
+from pipeline.program.feasibility import violations
+from pipeline.program.program import Transcription
+
+# What a coarse grid's optimum needs to be told apart and refined; only the last grid's is reported.
+ROUGH_TOLERANCE = 1e-4
+
+
+ROUGH_ITERATIONS = 120  # starts that succeed take 10 to 100
+
+
+ROUGH = {"constr_viol_tol": 1e-5, "acceptable_tol": 1e-4, "acceptable_constr_viol_tol": 1e-5}
+
+
+ROOM = 1e-3  # relative, to a torque limit that may be left out
+
+
+BETWEEN = 4  # points per interval where clearances between knots are looked at
+
+
+CLEARANCE_ROUNDS = 5
+
+
+STRAYED = 1.5  # times the guess's cost, from where on a solve has left it
+
+
+@dataclass(frozen=True)
+class Optimum:
+    """One local optimum on one grid, with the statistics of the solves that led to it."""
+
+    q: Array  # (N + 1, n)
+    cost: float
+    converged: bool
+    status: str
+    continuous: bool = True  # False: between its knots the motion leaves the path, it jumps from branch to branch
+    solves: list[dict[str, Any]] = field(default_factory=list)
+
+
+def optimise_start(context: tuple[Problem, Array, GlobalOptions], guess: Array) -> Optimum:
+    """One start on the coarse grid. Torques are optimised from a motion of little energy within the same limits.
+
+    From a wild motion the torque program fails often; and where even that energy program is infeasible, so is it.
+    """
+    problem, times, options = context
+    solves: list[dict[str, Any]] = []
+    first: Optimum | None = None
+    if problem.objective.second_order or _limits_torque(problem):
+        first_order = Lagrangian(problem.task, problem.objective).is_quadratic
+        only = replace(problem.objective, torque=0.0, reaction_force=0.0, reaction_torque=0.0)
+        objective = only if first_order else Objective()
+        first = _optimise(replace(_without_torque_limits(problem), objective=objective), times, guess, options)
+        solves += first.solves
+        if not first.converged:
+            return replace(first, solves=solves)
+        guess = first.q
+        if not problem.objective.second_order and _keeps_torque_limits(problem, times, guess):
+            return first
+    optimum = _optimise(problem, times, guess, options)
+    goes_on = len(times) < len(problem.times)
+    if first is not None and goes_on and _has_strayed(problem, times, guess, optimum):
+        cost = float(objective_values(problem, times, guess[None])[0])
+        optimum = replace(first, cost=cost, solves=optimum.solves)
+    return replace(optimum, solves=solves + optimum.solves)
+
+
+def _has_strayed(problem: Problem, times: Array, guess: Array, optimum: Optimum) -> bool:
+    """Whether a solve ended far above a guess that keeps every limit: its first steps led into a motion with jumps, which
+    coarse differences make an optimum of its own. A finer grid then starts from the guess. Accelerations must count for it.
+    """
+    if not problem.objective.second_order:
+        return False
+    if optimum.converged and optimum.cost <= STRAYED * float(objective_values(problem, times, guess[None])[0]):
+        return False
+    return not problem.constrained or all(v.relative <= ROOM for v in violations(problem, times, guess))
+
+
+def _limits_torque(problem: Problem) -> bool:
+    return bool(np.isfinite(problem.bounds.torque).any() or np.isfinite(problem.bounds.power).any())
+
+
+def _without_torque_limits(problem: Problem) -> Problem:
+    free = np.full(problem.task.arm.n, np.inf)
+    return replace(problem, limits=replace(problem.bounds, torque=free, power=free))
+
+
+def _keeps_torque_limits(problem: Problem, times: Array, q: Array) -> bool:
+    """Whether torque and power limits are kept with some room: an optimum without them is then one with them."""
+    worst = [v.relative for v in violations(problem, times, q) if v.kind in ("torque", "power")]
+    return all(relative < -ROOM for relative in worst)
+
+
+def _optimise_lazily(
+    problem: Problem, times: Array, guess: Array, options: GlobalOptions, keep_off: float = 0.0
+) -> Optimum:
+    """As `_optimise`; but where torque limits alone bring torques in and the guess keeps them, it is tried without."""
+    if (
+        problem.objective.second_order
+        or problem.integral_bounds.bounds(*SECOND_ORDER)
+        or not _limits_torque(problem)
+        or not _keeps_torque_limits(problem, times, guess)
+    ):
+        return _optimise(problem, times, guess, options, keep_off)
+    optimum = _optimise(_without_torque_limits(problem), times, guess, options, keep_off)
+    if not optimum.converged or _keeps_torque_limits(problem, times, optimum.q):
+        return optimum
+    bound = _optimise(problem, times, optimum.q, options, keep_off)
+    return replace(bound, solves=optimum.solves + bound.solves)
+
+
+def _optimise(problem: Problem, times: Array, guess: Array, options: GlobalOptions, keep_off: float = 0.0) -> Optimum:
+    program = Transcription(problem, times, guess, keep_off=keep_off)
+    last = len(times) == len(problem.times)
+    q, outcome, iterations = program.solve(
+        tolerance=options.tolerance if last else max(options.tolerance, ROUGH_TOLERANCE),
+        max_iterations=options.max_iterations if last else min(options.max_iterations, ROUGH_ITERATIONS),
+        extra=None if last else ROUGH,
+    )
+    cost = float(objective_values(problem, times, q[None])[0])
+    entry = {
+        "intervals": len(times) - 1,
+        "iterations": iterations,
+        "wall_time_s": outcome.wall_time,
+        "status": outcome.status,
+        "cost": cost,
+    }
+    return Optimum(q, cost, outcome.converged, outcome.status, solves=[entry])
+
+
+def refine(context: tuple[Problem, list[Array], GlobalOptions], start: Optimum) -> Optimum:
+    problem, grids, options = context
+    optimum, solves = start, list(start.solves)
+    on, failures = grids[0], 0
+    for fine in grids[1:]:
+        guess = CubicSpline(on, optimum.q)(fine)
+        finer = _optimise_lazily(problem, fine, guess, options)
+        solves += finer.solves
+        lost = not finer.converged or _has_strayed(problem, fine, guess, finer)
+        if not lost or fine is grids[-1]:
+            optimum, on, failures = finer, fine, 0
+            continue
+        failures += 1  # one grid may be unlucky; the next starts from the last that was not
+        if failures > 1:
+            return replace(finer, converged=False, solves=solves)
+    optimum = replace(optimum, solves=solves)
+    if problem.obstacles is not None and optimum.converged:
+        optimum = _clear_between(problem, problem.obstacles, grids[-1], optimum, options)
+    return replace(optimum, continuous=stays_on_path(problem, grids[-1], optimum.q))
+
+
+def _clear_between(
+    problem: Problem, obstacles: Obstacles, times: Array, optimum: Optimum, options: GlobalOptions
+) -> Optimum:
+    """The optimum that keeps its clearance between the knots too: solved again, a little farther off at the knots."""
+    clearance = Clearance(problem.task.arm, obstacles)
+    fine = np.interp(np.arange(BETWEEN * (len(times) - 1) + 1) / BETWEEN, np.arange(len(times)), times)
+    keep_off, solves = 0.0, list(optimum.solves)
+    for _ in range(CLEARANCE_ROUNDS):
+        lacking = obstacles.margin - float(clearance.smallest(CubicSpline(times, optimum.q)(fine)).min())
+        if lacking <= 0 or not optimum.converged:
+            break
+        keep_off += 1.2 * lacking + 1e-7
+        optimum = _optimise_lazily(problem, times, optimum.q, options, keep_off)
+        solves += optimum.solves
+    return replace(optimum, solves=solves)
+
+
+def stays_on_path(problem: Problem, times: Array, q: Array) -> bool:
+    """Whether the cubic spline through the knots follows the path between them, to 1 % of its length.
+
+    A finite-difference program also has optima that jump to another branch of the manifold within one interval.
+    """
+    middle = (times[1:] + times[:-1]) / 2
+    gap = problem.task.error(CubicSpline(times, q)(middle), problem.reference.position(middle))
+    return bool(
+        np.linalg.norm(gap[:, : len(problem.task.axes)], axis=1).max() <= 0.01 * problem.reference.geometry.length
+    )

@@ -1,0 +1,189 @@
+"""The interpolation-based Global Kinematic Planner (Global paper Section 3): many coarse starts, every optimum refined.
+
+Initial configurations and a population of motions are drawn and ranked (`search/population.py`), the best diverse ones are
+optimised on a coarse grid, and each distinct optimum is carried to the wanted knots by cubic splines, halving the step.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import Any
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from pipeline.common.arrays import Array
+from pipeline.config.methods import GlobalOptions
+from pipeline.methods import dynamic_programming
+from pipeline.methods.global_planner.optimum import Optimum, optimise_start, refine
+from pipeline.methods.method import ANY, Context, Method
+from pipeline.model.kinematics import wrap
+from pipeline.problem.limits import LIMIT_KINDS
+from pipeline.problem.problem import Problem
+from pipeline.problem.solution import Solution, Status, Trajectory
+from pipeline.program.feasibility import Relaxed, least_violation
+from pipeline.search.configurations import starting_points
+from pipeline.search.population import population, ranking
+from pipeline.search.selection import distinct, diverse
+
+TRACKING = 1e-8  # [m] what an optimum must keep at every knot
+
+
+ELASTIC_STARTS = 3  # from how many motions the least violation is sought when no motion is feasible
+
+
+FEWER = 12  # starts on a finer grid after none succeeded on the coarse one
+
+
+HOPELESS = 0.1  # relative violation on a coarse grid from which on finer ones are not tried
+
+
+def solve(problem: Problem, options: GlobalOptions, context: Context) -> list[Solution]:
+    """All distinct optima found, best first."""
+    grids = refinement(problem.times, options.coarse_steps)
+    motions, log = _starts(problem, grids[0], options, np.random.default_rng(context.seed))
+    if not len(motions):
+        message = "no candidate could follow the path from its start to its end: it leaves the reach of the arm"
+        return [_nothing(problem, Status.INFEASIBLE, message, log)]
+
+    while True:
+        starts = _optimise_starts(problem, grids[0], options, motions, context)
+        if any(start.converged for start in starts):
+            break
+        relaxed = _relaxed(problem, grids[0], motions)
+        if relaxed is not None and relaxed.feasible:
+            starts += context.workers.map(optimise_start, (problem, grids[0], options), [relaxed.q])
+            if starts[-1].converged:
+                break
+        elif relaxed is not None and (relaxed.worst.relative > HOPELESS or len(grids) == 1):
+            return [_nothing(problem, Status.INFEASIBLE, relaxed.worst.sentence, log)]
+        if len(grids) == 1:
+            break
+        # A coarse grid can be infeasible where a finer one is not: its finite differences are other numbers.
+        motions, grids = CubicSpline(grids[0], motions[:FEWER], axis=1)(grids[1]), grids[1:]
+    log["grids"] = [len(grid) - 1 for grid in grids]
+    log["starts"] = [
+        {"converged": start.converged, "cost": start.cost, "status": start.status, "solves": start.solves}
+        for start in starts
+    ]
+    basins = [starts[index] for index in _basins(problem, starts, options)]
+    refined = context.workers.map(refine, (problem, grids, options), basins)
+    found = [(fine, coarse) for fine, coarse in zip(refined, basins, strict=True) if fine.converged and fine.continuous]
+    log["jumping_optima"] = sum(fine.converged and not fine.continuous for fine in refined)
+    if not found:
+        return [_nothing(problem, Status.NOT_CONVERGED, _why(starts, refined), log)]
+    ranked = [found[index] for index in _distinct([fine for fine, _ in found], options, problem)]
+    solutions = []
+    for rank, (fine, coarse) in enumerate(ranked):
+        members = {"starts_in_basin": _members(problem, coarse, starts, options), "solves": fine.solves}
+        solutions.append(
+            Solution(
+                "global",
+                Trajectory(problem.times, fine.q),
+                Status.SOLVED,
+                optimum=rank + 1,
+                tracking_tolerance=TRACKING,
+                limits_kept=LIMIT_KINDS,
+                statistics={**(log if rank == 0 else {}), **members},
+            )
+        )
+    return solutions
+
+
+def refuses(problem: Problem, options: GlobalOptions) -> str | None:
+    """Starts by dynamic programming serve only what that method serves."""
+    if options.starts == "population":
+        return None
+    why = dynamic_programming.dynamic_programming.why_not(problem)
+    return why and f"method.global.starts = {options.starts}: {why}; starts = population serves every problem"
+
+
+global_planner = Method("global", "Global optimum", "#2F855A", GlobalOptions, ANY, solve, refuses)
+
+
+def refinement(times: Array, coarse_steps: int) -> list[Array]:
+    """Grids from coarse to fine: at most coarse_steps intervals, doubled until the wanted knots `times` are reached."""
+    intervals = len(times) - 1
+    sizes = [intervals]
+    while sizes[0] > coarse_steps:
+        sizes.insert(0, max(2, sizes[0] // 2))
+    place = np.arange(intervals + 1)
+    return [np.interp(np.linspace(0, intervals, size + 1), place, times) for size in sizes]
+
+
+def _starts(
+    problem: Problem, coarse: Array, options: GlobalOptions, rng: np.random.Generator
+) -> tuple[Array, dict[str, Any]]:
+    """The motions (K, N + 1, n) to optimise on the coarse grid, and how they came about."""
+    parts: list[Array] = []
+    log: dict[str, Any] = {}
+    revolute = problem.task.arm.description.revolute
+    if options.starts != "dynamic_programming":
+        configurations = starting_points(problem, options.configurations, rng, options.draw)
+        count = options.candidates or (len(coarse) * problem.task.arm.n) ** 2
+        motions = population(problem, coarse, configurations, count, rng)
+        log |= {"configurations": len(configurations), "candidates": len(motions)}
+        if len(motions):
+            costs = ranking(problem, coarse, motions, options.limit_weight)
+            parts.append(motions[diverse(motions, costs, options.optimised, options.same_path, revolute)])
+    if options.starts != "population":
+        paths = dynamic_programming.starts(problem, coarse)
+        log["dynamic_programming_paths"] = len(paths)
+        parts.append(paths)
+    empty = np.empty((0, len(coarse), problem.task.arm.n))
+    return np.concatenate(parts) if parts else empty, log
+
+
+def _optimise_starts(
+    problem: Problem, grid: Array, options: GlobalOptions, motions: Array, context: Context
+) -> list[Optimum]:
+    best = np.inf
+
+    def done(count: int, optimum: Optimum) -> None:
+        nonlocal best
+        best = min(best, optimum.cost) if optimum.converged else best
+        context.progress(count, len(motions), best)
+
+    return context.workers.map(optimise_start, (problem, grid, options), list(motions), done)
+
+
+def _basins(problem: Problem, starts: list[Optimum], options: GlobalOptions) -> list[int]:
+    """Indices of the starts that stand for the distinct optima of the coarse grid, best first."""
+    solved = [index for index, start in enumerate(starts) if start.converged]
+    return [solved[index] for index in _distinct([starts[index] for index in solved], options, problem)]
+
+
+def _distinct(optima: list[Optimum], options: GlobalOptions, problem: Problem) -> list[int]:
+    if not optima:
+        return []
+    motions, costs = np.array([o.q for o in optima]), np.array([o.cost for o in optima])
+    return distinct(motions, costs, len(optima), options.same_path, problem.task.arm.description.revolute)
+
+
+def _members(problem: Problem, optimum: Optimum, starts: list[Optimum], options: GlobalOptions) -> int:
+    """How many starts fell into the basin of one coarse optimum."""
+    solved = [start.q - optimum.q for start in starts if start.converged]
+    revolute = problem.task.arm.description.revolute
+    return int((np.abs(wrap(np.array(solved), revolute)).max(axis=(1, 2)) <= options.same_path).sum())
+
+
+def _nothing(problem: Problem, status: Status, message: str, log: dict[str, Any]) -> Solution:
+    standing = np.tile(problem.q_init, (len(problem.times), 1))
+    return Solution("global", Trajectory(problem.times, standing), status, message, statistics=log, found=False)
+
+
+def _relaxed(problem: Problem, times: Array, motions: Array) -> Relaxed | None:
+    if not problem.constrained:
+        return None
+    return least_violation(problem, times, list(motions[:ELASTIC_STARTS]))
+
+
+def _why(starts: list[Optimum], refined: list[Optimum]) -> str:
+    """Why there is no optimum although there are starts, in the solver's own words."""
+    if any(start.converged for start in starts):
+        words = "; ".join(
+            sorted({optimum.status if not optimum.converged else "jumps between branches" for optimum in refined})
+        )
+        return f"{len(refined)} optima of the coarse grid were lost on a finer one ({words})"
+    words = Counter(start.status for start in starts).most_common(1)[0][0]
+    return f"none of {len(starts)} starts converged (most often: {words})"
