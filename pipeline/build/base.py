@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import replace
+
+import numpy as np
+
 from pipeline.common.arrays import Array
 from pipeline.common.errors import ConfigError
 from pipeline.config.robot import FreeBaseConfig
 from pipeline.config.run import RunConfig
 from pipeline.model.arm import Arm
-from pipeline.model.base import FloatingArm
-from pipeline.model.base import is_planar
+from pipeline.model.base import FloatingArm, is_planar
 from pipeline.problem.limits import Limits
 from pipeline.problem.problem import Problem
 from pipeline.robot.spacecraft import Spacecraft
 from pipeline.robot.urdf import root_mass
-import numpy as np
 
 REACTIONS = {"reaction_force", "reaction_torque"}
 

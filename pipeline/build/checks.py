@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from pipeline.common.errors import ConfigError
-from pipeline.common.errors import PathError
+import numpy as np
+
+from pipeline.common.errors import ConfigError, PathError
 from pipeline.model.clearance import Clearance
 from pipeline.model.kinematics import project
-from pipeline.problem.problem import Boundary
-from pipeline.problem.problem import Problem
-import numpy as np
+from pipeline.problem.problem import Boundary, Problem
+
 
 def check_problem(problem: Problem) -> None:
     """Refuse what no motion can meet: contradicting limits, a fixed start outside them, an open path for a cycle."""

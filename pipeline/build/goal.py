@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
 from pipeline.build.robot import make_shape
 from pipeline.common.arrays import Array
 from pipeline.common.errors import ConfigError
-from pipeline.config.goal import LimitsConfig
-from pipeline.config.goal import WeightedConfig
+from pipeline.config.goal import LimitsConfig, WeightedConfig
 from pipeline.config.robot import ObstaclesConfig
 from pipeline.config.run import RunConfig
 from pipeline.model.arm import Arm
@@ -15,8 +18,7 @@ from pipeline.model.clearance import Obstacles
 from pipeline.problem.limits import Limits
 from pipeline.problem.objective import Objective
 from pipeline.problem.secondary import Secondary
-from typing import Any
-import numpy as np
+
 
 def make_limits(limits: LimitsConfig, arm: Arm) -> Limits:
     """The description's limits as far as `kind` takes them, overridden by the values given."""

@@ -3,34 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
 from pipeline.common.arrays import Array
-from pipeline.common.errors import ConfigError
-from pipeline.common.errors import RobotError
-from pipeline.config.path import CircleConfig
-from pipeline.config.path import PathConfig
-from pipeline.config.path import TimingConfig
-from pipeline.config.path import WaypointsConfig
+from pipeline.common.errors import ConfigError, RobotError
+from pipeline.config.path import CircleConfig, PathConfig, TimingConfig, WaypointsConfig
 from pipeline.config.robot import RobotConfig
 from pipeline.model.arm import Arm
 from pipeline.model.kinematics import place
-from pipeline.model.task import PositionTask
-from pipeline.model.task import Task
-from pipeline.model.task import pose_task
-from pipeline.path.curves import Geometry
-from pipeline.path.curves import Line
-from pipeline.path.curves import Spline
-from pipeline.path.curves import circle
-from pipeline.path.curves import direction_vector
+from pipeline.model.task import PositionTask, Task, pose_task
+from pipeline.path.curves import Geometry, Line, Spline, circle, direction_vector
 from pipeline.path.orientation import Orientation
-from pipeline.path.timing import ConstantSpeed
-from pipeline.path.timing import Quintic
-from pipeline.path.timing import RaisedCosine
-from pipeline.path.timing import Timing
-from pipeline.path.waypoints import read_orientations
-from pipeline.path.waypoints import read_waypoints
-from scipy.spatial.transform import Rotation
-from typing import Any
-import numpy as np
+from pipeline.path.timing import ConstantSpeed, Quintic, RaisedCosine, Timing
+from pipeline.path.waypoints import read_orientations, read_waypoints
 
 TIMINGS: dict[str, Callable[[float], Timing]] = {
     "raised_cosine": RaisedCosine,

@@ -3,21 +3,14 @@
 from __future__ import annotations
 
 from pipeline.build import base
-from pipeline.build.checks import check_problem
-from pipeline.build.checks import require_reach
-from pipeline.build.goal import make_limits
-from pipeline.build.goal import make_objective
-from pipeline.build.goal import make_obstacles
-from pipeline.build.path import TIMINGS
-from pipeline.build.path import make_knots
-from pipeline.build.path import make_path
-from pipeline.build.path import make_task
-from pipeline.build.robot import initial
-from pipeline.build.robot import load
+from pipeline.build.checks import check_problem, require_reach
+from pipeline.build.goal import make_limits, make_objective, make_obstacles
+from pipeline.build.path import TIMINGS, make_knots, make_path, make_task
+from pipeline.build.robot import initial, load
 from pipeline.config.run import RunConfig
 from pipeline.path.reference import Reference
-from pipeline.problem.problem import Boundary
-from pipeline.problem.problem import Problem
+from pipeline.problem.problem import Boundary, Problem
+
 
 def prepare(config: RunConfig) -> Problem:
     """The problem that a configuration states; raises InputError, one line, if it cannot be posed."""

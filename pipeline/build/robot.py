@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
+import difflib
 from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
 from pipeline.common.arrays import Array
-from pipeline.common.errors import ConfigError
-from pipeline.common.errors import RobotError
-from pipeline.config.robot import CapsuleConfig
-from pipeline.config.robot import RobotConfig
-from pipeline.config.robot import SphereConfig
+from pipeline.common.errors import ConfigError, RobotError
+from pipeline.config.robot import CapsuleConfig, RobotConfig, SphereConfig
 from pipeline.model.arm import Arm
 from pipeline.robot import urdf
 from pipeline.robot.description import Description
 from pipeline.robot.packages import find
-from pipeline.robot.shapes import Shape
-from pipeline.robot.shapes import capsule
-from scipy.spatial.transform import Rotation
-from typing import Any
-import difflib
-import numpy as np
+from pipeline.robot.shapes import Shape, capsule
 
 GRAVITY = {"none": (0.0, 0.0, 0.0), "earth": (0.0, 0.0, -9.80665)}  # [m/s^2]
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tests.support import composed
 
-from pipeline.run import run
+from pipeline.build.problem import prepare
 from pipeline.common.errors import ConfigError
 from pipeline.model.base import FloatingArm
-from pipeline.build.problem import prepare
+from pipeline.run import run
+from tests.support import composed
 
 FREE = ("base=free", "base.mass=10", "base.inertia=0.2")
 PANDA = ("robot=panda", "path.direction=[0,1,0]", "path.length=0.1")

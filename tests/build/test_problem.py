@@ -6,17 +6,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.support import composed, robot
 from scipy.spatial.transform import Rotation
 
-from pipeline.common.errors import ConfigError
-from pipeline.common.errors import PathError
-from pipeline.common.errors import RobotError
+from pipeline.build.problem import prepare
+from pipeline.common.errors import ConfigError, PathError, RobotError
 from pipeline.evaluation.evaluation import evaluate
 from pipeline.methods import lsv
-from pipeline.build.problem import prepare
 from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Status
+from tests.support import composed, robot
 
 SPACE = ("path.direction=[0,1,0]", "path.length=0.05", "timing.duration=2", "timing.steps=10")
 

@@ -14,7 +14,7 @@ i <= j (Featherstone 2008, chapter 2), and with
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -22,7 +22,8 @@ from pipeline.common.arrays import Array
 from pipeline.model.kernel.chain import Chain, Places, cross, outward
 
 
-NONE = np.empty((0, 0, 0))
+def _none() -> Array:
+    return np.empty((0, 0, 0))
 
 
 @dataclass(frozen=True)
@@ -32,9 +33,9 @@ class Energy:
     value: Array
     by_q: Array
     by_qd: Array
-    mass: Array = NONE
-    mixed: Array = NONE
-    by_q_q: Array = NONE
+    mass: Array = field(default_factory=_none)
+    mixed: Array = field(default_factory=_none)
+    by_q_q: Array = field(default_factory=_none)
 
 
 @dataclass(frozen=True)
