@@ -52,13 +52,16 @@ class RecedingOptions:
 class GlobalOptions:
     """The interpolation-based Global Kinematic Planner; counts as in its paper."""
 
-    starts: str = choice("population", "population", "dynamic_programming", "both")
+    starts: str = choice("roadmap", "roadmap", "population", "dynamic_programming", "both")
+    solver: str = choice("newton", "newton", "ipopt")
+    nodes: int = count(300, low=2)
+    layers: int = count(6, low=2)
     configurations: int = count(66)
     draw: str = choice("normal", "normal", "latin_hypercube", "uniform")
     candidates: int | None = count(None)
-    optimised: int = count(48)
+    optimised: int = count(64)
     limit_weight: float = number(0.01, low=0)
-    coarse_steps: int = count(12, low=2)
+    coarse_steps: int = count(25, low=2)
     tolerance: float = number(1e-8, above=0)
     max_iterations: int = count(300)
     same_path: float = number(0.05, above=0, unit="rad")

@@ -47,7 +47,8 @@ def population(problem: Problem, times: Array, starts: Array, count: int, rng: n
         before = motions[rows, i - 1]
         weight = arm.lift(before, constant[rows])
         weighted = np.isin(rows, by_inertia)
-        weight[weighted] = arm.inverse_inertia(before[weighted])
+        if weighted.any():
+            weight[weighted] = arm.inverse_inertia(before[weighted])
         target = np.tile(x_ref[i], (len(rows), 1))
         drifted = before + (times[i] - times[i - 1]) * arm.follow(before, np.zeros_like(before))
         motions[rows, i], error = project(problem.task, drifted, target, weight, tolerance=1e-9, max_iterations=12)

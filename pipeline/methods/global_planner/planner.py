@@ -15,7 +15,8 @@ from scipy.interpolate import CubicSpline
 from pipeline.common.arrays import Array
 from pipeline.config.methods import GlobalOptions
 from pipeline.methods import dynamic_programming
-from pipeline.methods.global_planner.optimum import Optimum, optimise_start, refine
+from pipeline.methods.global_planner.batch import Batch
+from pipeline.methods.global_planner.optimum import Optimum, go_on, optimise_start, refine
 from pipeline.methods.method import ANY, Context, Method
 from pipeline.model.kinematics import wrap
 from pipeline.problem.limits import LIMIT_KINDS
@@ -24,7 +25,16 @@ from pipeline.problem.solution import Solution, Status, Trajectory
 from pipeline.program.feasibility import Relaxed, least_violation
 from pipeline.search.configurations import starting_points
 from pipeline.search.population import population, ranking
+from pipeline.search.roadmap import Roadmap
 from pipeline.search.selection import distinct, diverse
+
+STARTS = {
+    "roadmap": ("roadmap",),
+    "population": ("population",),
+    "dynamic_programming": ("dynamic_programming",),
+    "both": ("population", "dynamic_programming"),
+}
+
 
 TRACKING = 1e-8  # [m] what an optimum must keep at every knot
 
@@ -46,8 +56,11 @@ def solve(problem: Problem, options: GlobalOptions, context: Context) -> list[So
         message = "no candidate could follow the path from its start to its end: it leaves the reach of the arm"
         return [_nothing(problem, Status.INFEASIBLE, message, log)]
 
+    why = Batch.without(problem, options)
+    batch = Batch(problem, options) if why is None else None
+    log["solver"] = "newton, confirmed by ipopt" if why is None else f"ipopt ({why})"
     while True:
-        starts = _optimise_starts(problem, grids[0], options, motions, context)
+        starts = _optimise_starts(problem, grids[0], options, motions, batch, context)
         if any(start.converged for start in starts):
             break
         relaxed = _relaxed(problem, grids[0], motions)
@@ -67,7 +80,7 @@ def solve(problem: Problem, options: GlobalOptions, context: Context) -> list[So
         for start in starts
     ]
     basins = [starts[index] for index in _basins(problem, starts, options)]
-    refined = context.workers.map(refine, (problem, grids, options), basins)
+    refined = _refine_all(problem, grids, options, basins, batch, context)
     found = [(fine, coarse) for fine, coarse in zip(refined, basins, strict=True) if fine.converged and fine.continuous]
     log["jumping_optima"] = sum(fine.converged and not fine.continuous for fine in refined)
     if not found:
@@ -92,10 +105,10 @@ def solve(problem: Problem, options: GlobalOptions, context: Context) -> list[So
 
 def refuses(problem: Problem, options: GlobalOptions) -> str | None:
     """Starts by dynamic programming serve only what that method serves."""
-    if options.starts == "population":
+    if "dynamic_programming" not in STARTS[options.starts]:
         return None
     why = dynamic_programming.dynamic_programming.why_not(problem)
-    return why and f"method.global.starts = {options.starts}: {why}; starts = population serves every problem"
+    return why and f"method.global.starts = {options.starts}: {why}; starts = roadmap serves every problem"
 
 
 global_planner = Method("global", "Global optimum", "#2F855A", GlobalOptions, ANY, solve, refuses)
@@ -118,7 +131,15 @@ def _starts(
     parts: list[Array] = []
     log: dict[str, Any] = {}
     revolute = problem.task.arm.description.revolute
-    if options.starts != "dynamic_programming":
+    wanted = STARTS[options.starts]
+    if "roadmap" in wanted and problem.task.arm.base_coordinates:
+        wanted = ("population",)
+        log["roadmap"] = "not for a base that moves or is held: population instead"
+    if "roadmap" in wanted:
+        paths = Roadmap(options.nodes, options.layers, options.optimised).starts(problem, coarse, rng)
+        log["roadmap_paths"] = len(paths)
+        parts.append(paths)
+    if "population" in wanted:
         configurations = starting_points(problem, options.configurations, rng, options.draw)
         count = options.candidates or (len(coarse) * problem.task.arm.n) ** 2
         motions = population(problem, coarse, configurations, count, rng)
@@ -126,7 +147,7 @@ def _starts(
         if len(motions):
             costs = ranking(problem, coarse, motions, options.limit_weight)
             parts.append(motions[diverse(motions, costs, options.optimised, options.same_path, revolute)])
-    if options.starts != "population":
+    if "dynamic_programming" in wanted:
         paths = dynamic_programming.starts(problem, coarse)
         log["dynamic_programming_paths"] = len(paths)
         parts.append(paths)
@@ -135,7 +156,7 @@ def _starts(
 
 
 def _optimise_starts(
-    problem: Problem, grid: Array, options: GlobalOptions, motions: Array, context: Context
+    problem: Problem, grid: Array, options: GlobalOptions, motions: Array, batch: Batch | None, context: Context
 ) -> list[Optimum]:
     best = np.inf
 
@@ -144,7 +165,30 @@ def _optimise_starts(
         best = min(best, optimum.cost) if optimum.converged else best
         context.progress(count, len(motions), best)
 
-    return context.workers.map(optimise_start, (problem, grid, options), list(motions), done)
+    if batch is None:
+        return context.workers.map(optimise_start, (problem, grid, options), list(motions), done)
+    firsts = batch.coarse(grid, motions)
+    if batch.first is problem:
+        for count, first in enumerate(firsts, 1):
+            done(count, first)
+        return firsts
+    return context.workers.map(go_on, (problem, grid, options), firsts, done)
+
+
+def _refine_all(
+    problem: Problem,
+    grids: list[Array],
+    options: GlobalOptions,
+    basins: list[Optimum],
+    batch: Batch | None,
+    context: Context,
+) -> list[Optimum]:
+    """Every basin on the last grid: in one batch, and those that it does not finish one by one."""
+    alone = batch is None or problem.objective.second_order
+    refined = [None] * len(basins) if batch is None or alone else batch.refine(grids, basins)
+    left = [basin for basin, optimum in zip(basins, refined, strict=True) if optimum is None]
+    others = iter(context.workers.map(refine, (problem, grids, options), left))
+    return [next(others) if optimum is None else optimum for optimum in refined]
 
 
 def _basins(problem: Problem, starts: list[Optimum], options: GlobalOptions) -> list[int]:

@@ -14,6 +14,7 @@ Each iteration serves all starts and all knots with one call of the kernel.
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass
 from typing import Any
 
@@ -51,13 +52,16 @@ COLD, WARM = Barrier(), Barrier(1e-6, 1e-3)  # warm: a spline of a coarser optim
 
 @dataclass
 class Answer:
-    """Per start: motions q (S, N + 1, n), cost (S,), converged, iterations (S,), and the largest error of the path (S,)."""
+    """Per start: motions q (S, N + 1, n), cost (S,), converged, iterations (S,), the largest error of the path (S,),
+    and wall_time [s] of all.
+    """
 
     q: Array
     cost: Array
     converged: NDArray[np.bool_]
     iterations: NDArray[np.int_]
     residual: Array
+    wall_time: float = 0.0
 
 
 @dataclass
@@ -107,7 +111,10 @@ class Newton:
     def solve(self, q: Array, barrier: Barrier = COLD, *, tolerance: float = 1e-10, max_iterations: int = 60) -> Answer:
         """From motions q (S, N + 1, n); never raises for a start that fails."""
         with np.errstate(all="ignore"):  # a start at a singularity fails alone
-            return self._solve(np.array(q, dtype=float), barrier, tolerance, max_iterations)
+            begin = time.perf_counter()
+            answer = self._solve(np.array(q, dtype=float), barrier, tolerance, max_iterations)
+            answer.wall_time = time.perf_counter() - begin
+            return answer
 
     def _solve(self, q: Array, barrier: Barrier, tolerance: float, max_iterations: int) -> Answer:
         count = len(q)
