@@ -172,7 +172,17 @@ def _optimise_starts(
         for count, first in enumerate(firsts, 1):
             done(count, first)
         return firsts
-    return context.workers.map(go_on, (problem, grid, options), firsts, done)
+    # Where starts have come to the same motion, one of them goes on for all.
+    solved = [first for first in firsts if first.converged]
+    chosen = [solved[index] for index in _distinct(solved, options, problem)]
+    further = context.workers.map(go_on, (problem, grid, options), chosen, done)
+    return [further[_nearest(problem, first, chosen)] if first.converged else first for first in firsts]
+
+
+def _nearest(problem: Problem, optimum: Optimum, others: list[Optimum]) -> int:
+    """Which of the others' motions is nearest."""
+    apart = wrap(np.array([other.q for other in others]) - optimum.q, problem.task.arm.description.revolute)
+    return int(np.abs(apart).max(axis=(1, 2)).argmin())
 
 
 def _refine_all(
