@@ -145,7 +145,7 @@ def reproduced(tmp_path_factory: pytest.TempPathFactory) -> Path:
             patch.setattr(module, "write", lambda *_, **__: None)
         for names, words in (
             (("pmke", "global"), (*few, "identification.documents=[global]")),
-            (("pontryagin",), ("methods=[pontryagin]", "method.pontryagin.formulation=as_printed")),
+            (("pontryagin",), ("methods=[pontryagin_as_printed]",)),
         ):
             GlobalHydra.instance().clear()
             wanted = dict.fromkeys(e for name in names for e in documents.read(name).experiments if e != "pareto")

@@ -10,9 +10,13 @@ from scipy.spatial.transform import Rotation
 
 from pipeline.build.problem import prepare
 from pipeline.common.files import shipped
+from pipeline.config.methods import CalculusOfVariationsOptions
 from pipeline.evaluation.evaluation import evaluate
-from pipeline.methods import calculus_of_variations, global_planner, lsv
-from pipeline.methods.pmke import predictive as pmke
+from pipeline.methods.calculus_of_variations.stationary import calculus_of_variations
+from pipeline.methods.global_planner.planner import global_planner
+from pipeline.methods.lsv import inertia_weighted, lsv
+from pipeline.methods.method import Context
+from pipeline.methods.pmke.predictive import pmke
 from pipeline.model.arm import Arm
 from pipeline.model.clearance import Obstacles
 from pipeline.model.task import PoseTask, PositionTask
@@ -133,7 +137,7 @@ def test_planar_4r_equals_the_peer() -> None:
     problem = prepare(
         composed("robot=planar4r", "path.length=0.5", "path.direction=150", "timing.duration=2", "timing.steps=40")
     )
-    best = global_planner.solve(problem)[0]
+    best = global_planner(problem)[0]
     ours = evaluate(problem, best)
     rng = np.random.default_rng(3)
     guesses = population(problem, problem.times, problem.q_init[None], 400, rng)
@@ -143,7 +147,7 @@ def test_planar_4r_equals_the_peer() -> None:
     path = problem.reference.position(problem.times[1:])
     costs = [solve(program, problem.q_init, path, guess[1:])[1] for guess in guesses]
     assert ours.energy_integral[-1] == pytest.approx(min(costs), rel=1e-6)
-    assert ours.energy_integral[-1] < 0.8 * evaluate(problem, lsv.solve(problem)).energy_integral[-1]
+    assert ours.energy_integral[-1] < 0.8 * evaluate(problem, lsv(problem)[0]).energy_integral[-1]
 
 
 @pytest.mark.slow
@@ -151,9 +155,9 @@ def test_the_panda_on_a_line() -> None:
     """The documents' next step, a real arm: 20 % below the pseudoinverse within every limit of its description."""
     config = composed("+experiment=panda")
     problem = prepare(config)
-    best = evaluate(problem, global_planner.solve(problem, config.method.global_, config.seed)[0])
-    plain = evaluate(problem, lsv.solve(problem))
-    weighted = evaluate(problem, lsv.solve(problem, method="inertia_weighted"))
+    best = evaluate(problem, global_planner(problem, config.method.global_, Context(config.seed))[0])
+    plain = evaluate(problem, lsv(problem)[0])
+    weighted = evaluate(problem, inertia_weighted(problem)[0])
     assert best.status is plain.status is weighted.status is Status.SOLVED
     assert best.objective < weighted.objective < plain.objective
     assert best.objective < 0.8 * plain.objective
@@ -165,8 +169,8 @@ def test_the_panda_on_a_line() -> None:
 def test_the_panda_holds_its_hand_and_keeps_off_a_ball() -> None:
     config = composed("+experiment=panda_pose_obstacle")
     problem = prepare(config)
-    best = evaluate(problem, global_planner.solve(problem, config.method.global_, config.seed)[0])
-    plain = evaluate(problem, lsv.solve(problem))
+    best = evaluate(problem, global_planner(problem, config.method.global_, Context(config.seed))[0])
+    plain = evaluate(problem, lsv(problem)[0])
     assert plain.clearance.min() < 0
     assert best.status is Status.SOLVED
     assert best.orientation_error.max() < 1e-8
@@ -180,13 +184,8 @@ def test_the_panda_holds_its_hand_and_keeps_off_a_ball() -> None:
 def test_a_pose_task_by_the_calculus_of_variations_and_by_the_planner() -> None:
     """r = 1 on seven joints, from a fixed start and without limits: two methods that share nothing but the arm."""
     problem = prepare(composed("+experiment=panda_pose", "limits=none", "timing.steps=50", "path.turn=[0,0.4,0.2]"))
-    best = evaluate(problem, global_planner.solve(problem, seed=1)[0])
-    found = calculus_of_variations.solve(
-        problem,
-        composed(
-            "method.calculus_of_variations.spacing=0.1", "method.calculus_of_variations.max_speed=0.5"
-        ).method.calculus_of_variations,
-    )
+    best = evaluate(problem, global_planner(problem)[0])
+    found = calculus_of_variations(problem, CalculusOfVariationsOptions(spacing=0.1, max_speed=0.5))
     stationary = min(float(motion.statistics["integral"]) for motion in found)
     assert best.energy_integral_spline == pytest.approx(stationary, rel=0.02)
     nearest = min(np.abs(motion.trajectory.q - best.q).max() for motion in found)
@@ -205,10 +204,10 @@ def test_pmke_and_pointing() -> None:
         )
     )
     for solution in (
-        lsv.solve(problem),
-        lsv.solve(problem, method="inertia_weighted"),
-        pmke.solve(problem),
-        global_planner.solve(problem, composed("method.global.optimised=4").method.global_)[0],
+        lsv(problem)[0],
+        inertia_weighted(problem)[0],
+        pmke(problem)[0],
+        global_planner(problem, composed("method.global.optimised=4").method.global_)[0],
     ):
         judged = evaluate(problem, solution)
         assert judged.status is Status.SOLVED, judged.message

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from hydra import compose, initialize_config_dir
 from hydra.core.global_hydra import GlobalHydra
 from omegaconf import DictConfig, OmegaConf
@@ -9,6 +11,7 @@ from omegaconf.errors import OmegaConfBaseException
 
 from pipeline.common.errors import ConfigError
 from pipeline.common.files import shipped
+from pipeline.config.methods import METHODS
 from pipeline.config.run import RunConfig, check
 
 
@@ -31,4 +34,15 @@ def checked(values: DictConfig) -> RunConfig:
     except OmegaConfBaseException as error:
         raise ConfigError(f"{error.full_key}: {str(error.msg).splitlines()[0]}") from None
     assert isinstance(plain, dict)
+    _require_every_method(plain.get("method"))
     return check({str(key): value for key, value in plain.items()})
+
+
+def _require_every_method(group: Any) -> None:
+    """Refuse `method=global`, which would leave the methods that run as they are."""
+    if isinstance(group, dict) and not set(METHODS) <= set(group):
+        chosen = ", ".join(map(str, group))
+        raise ConfigError(
+            f"method = {chosen}: the group holds the options of all methods; which of them run is said by "
+            f"methods=[{chosen}]"
+        )

@@ -16,6 +16,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeVar
 
 from pipeline.common.errors import ConfigError
+from pipeline.config.renamed import renamed
 
 T = TypeVar("T")
 
@@ -314,6 +315,10 @@ def _build_kind(kinds: Mapping[str, type], value: Any, where: str) -> Any:
 
 
 def unknown_key(key: str, allowed: Sequence[str]) -> ConfigError:
+    """The error of a key that there is not, with the closest one that there is, or with its new name."""
+    now = renamed(key)
+    if now is not None:
+        return ConfigError(f"{key}: {now}")
     last = key.rsplit(".", 1)[-1]
     close = difflib.get_close_matches(last, allowed, n=1)
     hint = f"; did you mean {close[0]}?" if close else ""

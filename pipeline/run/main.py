@@ -9,8 +9,9 @@ import os
 import re
 import sys
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import hydra
 from hydra.core.hydra_config import HydraConfig
@@ -23,6 +24,7 @@ from pipeline.common.errors import InputError, OutputError
 from pipeline.common.files import shipped
 from pipeline.config.compose import checked
 from pipeline.config.fields import unknown_key
+from pipeline.config.run import RunConfig
 from pipeline.run import session
 
 CONF = str(shipped("conf"))
@@ -65,6 +67,9 @@ def main() -> int:
 def run_job(job: Callable[[DictConfig], int], overrides: Sequence[str] = ()) -> int:
     """Parse the command line, do the job, and turn every foreseeable error into one line; `overrides` come before it."""
     sys.argv[1:1] = overrides
+    for word in sys.argv[1:]:
+        if _deletes_an_option(word):
+            return _complain(f"{word}: options cannot be deleted, only entries of tables; give it another value")
     # Hydra then hands its errors to us instead of printing pages and leaving with 1.
     os.environ["HYDRA_FULL_ERROR"] = "1"
     try:
@@ -85,6 +90,22 @@ def run_job(job: Callable[[DictConfig], int], overrides: Sequence[str] = ()) -> 
     return session.exit_code
 
 
+def _deletes_an_option(word: str) -> bool:
+    """Whether `~key` would take the default in place of what the files say, without a word."""
+    found = re.fullmatch(r"~(\w[\w./]*)(@.*)?(=.*)?", word)
+    if found is None:
+        return False
+    first, *rest = found.group(1).replace("/", ".").split(".")
+    value: Any = RunConfig()
+    if not hasattr(value, first):
+        return False
+    for part in (first, *rest):
+        if value is None or isinstance(value, Mapping):
+            return False  # an entry of a table, such as robot.locked
+        value = getattr(value, part, value)
+    return True
+
+
 def _complain(message: str, code: int = 2) -> int:
     print(f"error: {message}", file=sys.stderr)
     return code
@@ -99,7 +120,9 @@ def _in_one_line(error: Exception) -> str:
     message = str(error.__cause__ or error)
     if isinstance(error, OverrideParseException):
         message = f"in {' '.join(sys.argv[1:])}: {error}"
-    unknown = re.search(r"Could not (?:override|append to config\.?[^']*|find) '([^']+)'", str(error))
+    unknown = re.search(
+        r"Could not (?:override|append to config\.?[^']*|find) '([^']+)'", str(error)
+    )
     if unknown:
         return str(unknown_key(unknown.group(1), _keys_beside(unknown.group(1))))
     return " ".join(line.strip() for line in message.splitlines() if line.strip() and not line.startswith("See http"))

@@ -25,7 +25,9 @@ from pipeline.artifacts.recording import blueprint, recording
 from pipeline.artifacts.recording.arm import _rigid
 from pipeline.config.methods import GlobalOptions, LsvOptions
 from pipeline.evaluation.evaluation import Evaluation, evaluate
-from pipeline.methods import global_planner, lsv
+from pipeline.methods.global_planner.planner import global_planner
+from pipeline.methods.lsv import lsv
+from pipeline.methods.registry import METHODS
 from pipeline.model.arm import Arm
 from pipeline.model.clearance import Obstacles
 from pipeline.model.task import PositionTask
@@ -56,8 +58,8 @@ def make_problem(file: Path) -> Problem:
 def case() -> Case:
     """LSV, which meets a singularity, the global optimum and, to have two of one method, that again as its second."""
     problem = make_problem(ROBOT)
-    best = global_planner.solve(problem, GlobalOptions(candidates=50, starts=4), 1)[0]
-    solutions = [lsv.solve(problem, LsvOptions()), best, dataclasses.replace(best, optimum=2)]
+    best = global_planner(problem, GlobalOptions(candidates=50, starts="both"))[0]
+    solutions = [lsv(problem, LsvOptions())[0], best, dataclasses.replace(best, optimum=2)]
     return problem, [evaluate(problem, solution) for solution in solutions]
 
 
@@ -249,9 +251,9 @@ def test_a_motion_that_ends_in_nan_is_drawn_up_to_there(case: Case, tmp_path: Pa
 
 
 def test_one_colour_per_motion() -> None:
-    colors = [style.color(label) for label in (*style.METHOD_COLORS, "global 2", "global 3", "pmke 2")]
+    colors = [style.color(label) for label in (*METHODS, "global 2", "global 3", "pmke 2")]
     assert len(set(colors)) == len(colors)
-    assert style.color("global") == style.METHOD_COLORS["global"]
+    assert style.color("global") == METHODS["global"].color
     assert style.name("global 2") == "Global optimum 2"
     assert blueprint.slug("global 2") == "global_2"
 

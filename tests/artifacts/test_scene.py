@@ -95,9 +95,9 @@ def test_front_of_rotation_against_energy(tmp_path: Path) -> None:
     words = (
         "timing.steps=16",
         "method.global.optimised=4",
-        "pareto.steps=6",
-        "pareto.rounds=1",
-        "pareto.max_iterations=60",
+        "method.pareto.steps=6",
+        "method.pareto.rounds=1",
+        "method.pareto.max_iterations=60",
     )
     assert run.run_and_write(composed("+experiment=floating_front", *words, "parallel.workers=1"), tmp_path) == 0
     front = pd.read_csv(tmp_path / "front.csv")

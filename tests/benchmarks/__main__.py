@@ -16,8 +16,8 @@ from scipy.interpolate import CubicSpline
 from pipeline.build.problem import prepare
 from pipeline.config.methods import GlobalOptions, PmkeOptions
 from pipeline.config.run import check
-from pipeline.methods import global_planner
-from pipeline.methods.pmke import predictive as pmke
+from pipeline.methods.global_planner.planner import global_planner, refinement
+from pipeline.methods.pmke.predictive import pmke
 from pipeline.methods.pmke.window import Window
 from pipeline.problem.lagrangian import Lagrangian
 from pipeline.program.program import Transcription
@@ -49,7 +49,7 @@ def predictions() -> None:
 
     options = PmkeOptions()
     Window.solve = record  # type: ignore[method-assign]
-    pmke.solve(problem, options)
+    pmke(problem, options)
     Window.solve = solve  # type: ignore[method-assign]
 
     window = Window(Lagrangian(problem.task, problem.objective), options.horizon, options.prediction_step)
@@ -70,8 +70,8 @@ def fine_solve() -> None:
     """The last stage of the global planner on trajectory 3: 101 points, 303 parameters, started from the stage before."""
     problem = prepare(check({}))
     options = GlobalOptions()
-    coarse = global_planner.refinement(problem.times, options.coarse_steps)[-2]
-    rough = global_planner.solve(prepare(check({"timing": {"steps": len(coarse) - 1}})), options)[0]
+    coarse = refinement(problem.times, options.coarse_steps)[-2]
+    rough = global_planner(prepare(check({"timing": {"steps": len(coarse) - 1}})), options)[0]
     guess = CubicSpline(coarse, rough.trajectory.q)(problem.times)
     arm = peer.PlanarArm.from_urdf(peer.ROBOT)
     step = float(problem.times[1])

@@ -20,10 +20,10 @@ from pipeline.build.problem import prepare
 from pipeline.common.arrays import Array
 from pipeline.config.compose import checked
 from pipeline.config.methods import GlobalOptions
-from pipeline.methods import (
-    global_planner,
-)
-from pipeline.methods.global_planner import Optimum
+from pipeline.methods.global_planner import optimum, planner
+from pipeline.methods.global_planner.optimum import Optimum
+from pipeline.methods.global_planner.planner import global_planner
+from pipeline.methods.method import Context
 from pipeline.problem.costs import objective_values
 from pipeline.problem.problem import Boundary, Problem
 from pipeline.problem.solution import Status
@@ -52,7 +52,7 @@ class Side:
             self.seconds += time.perf_counter() - begin
             return answer
 
-        with mock.patch.object(global_planner, "_optimise", timed):
+        with mock.patch.object(optimum, "_optimise", timed):
             return step(context, item)
 
 
@@ -103,16 +103,16 @@ def simulation(name: str) -> None:
     with initialize_config_dir(str(peer.PROJECT / "conf"), version_base="1.3"):
         config = checked(compose("config", overrides=[f"+experiment={name}"]))
     problem, options = prepare(config), config.method.global_
-    grids = global_planner.refinement(problem.times, options.coarse_steps)
-    motions, _ = global_planner._starts(problem, grids[0], options, np.random.default_rng(config.seed))
-    ours, theirs = Side(global_planner._optimise), Peer()
+    grids = planner.refinement(problem.times, options.coarse_steps)
+    motions, _ = planner._starts(problem, grids[0], options, np.random.default_rng(config.seed))
+    ours, theirs = Side(optimum._optimise), Peer()
     sides = (ours, theirs)
     for number, motion in enumerate(motions):
         for side in sides if number % 2 else sides[::-1]:
-            side.starts.append(side.run(global_planner._optimise_start, (problem, grids[0], options), motion))
+            side.starts.append(side.run(optimum.optimise_start, (problem, grids[0], options), motion))
     for side in sides:
-        basins = global_planner._basins(problem, side.starts, options)
-        fine = [side.run(global_planner._refine, (problem, grids, options), side.starts[basin]) for basin in basins]
+        basins = planner._basins(problem, side.starts, options)
+        fine = [side.run(optimum.refine, (problem, grids, options), side.starts[basin]) for basin in basins]
         side.optima = keep(problem, options, fine)
     counts = [sum(start.converged for start in side.starts) for side in sides]
     note = f"of {len(motions)} starts {counts[0]} and {counts[1]} converged; CasADi built its functions in"
@@ -120,20 +120,20 @@ def simulation(name: str) -> None:
     found = {"ours": ours.optima, "peer": theirs.optima}
     if not problem.objective.torque:
         begin = time.perf_counter()
-        solutions = global_planner.solve(problem, replace(options, starts="dynamic_programming"), config.seed)
+        solutions = global_planner(problem, replace(options, starts="dynamic_programming"), Context(config.seed))
         seconds = time.perf_counter() - begin
         grown = np.array([solution.trajectory.q for solution in solutions if solution.status is Status.SOLVED])
         costs = objective_values(problem, problem.times, grown)
         found["dp"] = [Optimum(q, float(cost), True, "") for q, cost in zip(grown, costs, strict=True)]
         line(f"{name}, dynamic_programming", seconds, theirs.seconds, "the whole planner against the same peer")
     for label, optima in found.items():
-        print(f"  {label:<5}{'  '.join(f'{optimum.cost:.6f}' for optimum in optima)}")
+        print(f"  {label:<5}{'  '.join(f'{one.cost:.6f}' for one in optima)}")
     agreement(problem, theirs.program(problem, problem.times, options), found)
 
 
 def keep(problem: Problem, options: GlobalOptions, fine: list[Optimum]) -> list[Optimum]:
     good = [optimum for optimum in fine if optimum.converged and optimum.continuous]
-    return [good[index] for index in global_planner._distinct(good, options, problem)]
+    return [good[index] for index in planner._distinct(good, options, problem)]
 
 
 def agreement(problem: Problem, program: peer.Program, found: dict[str, list[Optimum]]) -> None:

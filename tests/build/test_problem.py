@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from pipeline.build.problem import prepare
 from pipeline.common.errors import ConfigError, PathError, RobotError
 from pipeline.evaluation.evaluation import evaluate
-from pipeline.methods import lsv
+from pipeline.methods.lsv import lsv
 from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Status
 from tests.support import composed, robot
@@ -104,7 +104,7 @@ def test_way_points_with_orientations(tmp_path: Path, header: str) -> None:
     position, rotation = problem.task.arm.pose(problem.q_init[None])
     np.testing.assert_allclose(position[0], POINTS[0], atol=1e-8)
     np.testing.assert_allclose(rotation[0], TURNS[0].as_matrix(), atol=1e-8)
-    motion = evaluate(problem, lsv.solve(problem))
+    motion = evaluate(problem, lsv(problem)[0])
     assert motion.status is Status.SOLVED
     end = problem.task.arm.pose(motion.q[[-1]])[1][0]
     assert (TURNS[-1].inv() * Rotation.from_matrix(end)).magnitude() < 1e-3

@@ -24,7 +24,8 @@ from pipeline.common import cluster
 from pipeline.common.errors import ConfigError
 from pipeline.common.workers import Workers
 from pipeline.config import run as config
-from pipeline.methods import global_planner
+from pipeline.methods.global_planner.planner import global_planner
+from pipeline.methods.method import Context
 from pipeline.run.run import UNFINISHED
 from tests.common.test_workers import SIM1
 from tests.run.test_main import ROOT, assert_refused, call
@@ -158,7 +159,7 @@ def test_one_solve_at_a_time_on_one_thread(two_workers: Cluster, tmp_path: Path)
 def test_the_planner_gives_the_same_as_here(two_workers: Cluster, tmp_path: Path) -> None:
     asked = config.check(SIM1)
     ways = [Workers(1), Workers(2), Workers(store=tmp_path, address=two_workers.address)]
-    solved = [global_planner.solve(prepare(asked), asked.method.global_, 1, workers) for workers in ways]
+    solved = [global_planner(prepare(asked), asked.method.global_, Context(1, workers)) for workers in ways]
     assert list(tmp_path.glob("*.pickle"))
     assert len({len(solutions) for solutions in solved}) == 1
     for one, two, there in zip(*solved, strict=True):

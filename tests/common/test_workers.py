@@ -19,7 +19,8 @@ import pytest
 from pipeline.build.problem import prepare
 from pipeline.common.workers import Workers
 from pipeline.config import run as config
-from pipeline.methods import global_planner
+from pipeline.methods import method
+from pipeline.methods.global_planner.planner import global_planner
 from pipeline.run.run import UNFINISHED
 from tests.support import ROOT, RUN_FILES
 
@@ -171,7 +172,9 @@ def test_the_planner_gives_the_same_with_one_worker_and_two(tmp_path: Path, stor
     asked = config.check(SIM1)
     problem = prepare(asked)
     solved = [
-        global_planner.solve(problem, asked.method.global_, 1, Workers(count, tmp_path / str(count) if store else None))
+        global_planner(
+            problem, asked.method.global_, method.Context(1, Workers(count, tmp_path / str(count) if store else None))
+        )
         for count in (1, 2)
     ]
     assert len(solved[0]) == len(solved[1])
@@ -184,11 +187,11 @@ def test_the_planner_starts_from_what_is_kept(tmp_path: Path) -> None:
     """Also from another process's files: keys do not depend on what this one has done with its objects."""
     asked = config.check(SIM1)
     workers = Workers(1, tmp_path)
-    first = global_planner.solve(prepare(asked), asked.method.global_, 1, workers)
+    first = global_planner(prepare(asked), asked.method.global_, method.Context(1, workers))
     kept = {file: file.stat().st_mtime_ns for file in tmp_path.iterdir()}
     problem = prepare(asked)
     problem.task.arm.mass_matrix(np.zeros((20, 3)))  # has built its plants
-    second = global_planner.solve(problem, asked.method.global_, 1, workers)
+    second = global_planner(problem, asked.method.global_, method.Context(1, workers))
     assert {file: file.stat().st_mtime_ns for file in tmp_path.iterdir()} == kept
     np.testing.assert_array_equal(first[0].trajectory.q, second[0].trajectory.q)
 
@@ -228,7 +231,7 @@ def test_a_killed_run_goes_on(tmp_path: Path) -> None:
     # The same as without the interruption.
     options = {"configurations": 8, "candidates": 100, "optimised": 10}
     undisturbed = config.check({**SIM1, "method": {"global": options}})
-    whole = global_planner.solve(prepare(undisturbed), undisturbed.method.global_, 1)
+    whole = global_planner(prepare(undisturbed), undisturbed.method.global_)
     motions = pd.read_parquet(killed / "trajectories.parquet").groupby("optimum")
     assert len(motions) == len(whole)
     for (_, part), solution in zip(motions, whole, strict=True):

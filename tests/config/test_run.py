@@ -13,7 +13,7 @@ from omegaconf import DictConfig, OmegaConf
 from pipeline.config import compose as composing
 from pipeline.config import run as schema
 from pipeline.config.methods import METHODS as ALL_METHODS
-from pipeline.config.methods import MethodConfig
+from pipeline.methods.registry import METHODS as REGISTRY
 from tests.support import ROOT
 
 CONF = ROOT / "conf"
@@ -66,7 +66,7 @@ def test_the_files_say_what_the_schema_says() -> None:
 
 def test_the_files_hold_every_key_of_the_schema() -> None:
     own = OmegaConf.to_container(
-        OmegaConf.masked_copy(composed(), [f.name for f in dataclasses.fields(schema.RunConfig)])
+        OmegaConf.masked_copy(composed(), [f.name for f in dataclasses.fields(schema.RunConfig)]), resolve=True
     )
     defaults = dataclasses.asdict(schema.RunConfig())
     defaults["method"]["global"] = defaults["method"].pop("global_")
@@ -97,12 +97,10 @@ def test_every_option_of_every_group(option: str) -> None:
 
 
 def test_every_method_has_its_options() -> None:
-    """In the group `method`, or under a key of its own."""
-    grouped = {field.name.rstrip("_") for field in dataclasses.fields(MethodConfig)}
-    assert set(METHODS) == grouped
-    own = {field.name for field in dataclasses.fields(schema.RunConfig)}
-    assert set(ALL_METHODS) - grouped <= own
-    assert grouped <= set(ALL_METHODS)
+    """A file, a field of the schema and an entry of the registry, which name one another's classes."""
+    assert sorted(METHODS) == sorted(ALL_METHODS) == sorted(REGISTRY)
+    for name, method in REGISTRY.items():
+        assert type(schema.RunConfig().method.of(name)) is method.options
 
 
 @pytest.mark.parametrize("experiment", EXPERIMENTS)
@@ -110,8 +108,7 @@ def test_every_experiment(experiment: str) -> None:
     config = checked(f"+experiment={experiment}")
     assert config.name == experiment
     assert config != dataclasses.replace(schema.RunConfig(), name=experiment), "an experiment that changes nothing"
-    printed = {method.removesuffix("_as_printed") for method in config.published.values}
-    assert printed <= set(config.methods), "a printed number without a method to compare it with"
+    assert set(config.published.values) <= set(config.methods), "a printed number without a method to compare it with"
 
 
 @pytest.mark.parametrize("experiment", EXPERIMENTS)

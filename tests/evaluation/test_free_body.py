@@ -12,8 +12,11 @@ from pipeline.build.problem import prepare
 from pipeline.common.arrays import Array
 from pipeline.evaluation.evaluation import Evaluation, evaluate
 from pipeline.evaluation.free_body import BasePlant, integrate
-from pipeline.methods import global_planner, lsv
-from pipeline.methods.pmke import predictive as pmke
+from pipeline.methods.global_planner.planner import global_planner
+from pipeline.methods.lsv import inertia_weighted, lsv
+from pipeline.methods.method import Context
+from pipeline.methods.pmke.predictive import pmke
+from pipeline.methods.registry import METHODS
 from pipeline.model.base import FloatingArm
 from pipeline.problem.costs import integrals
 from pipeline.problem.objective import IntegralBounds, Objective
@@ -34,7 +37,7 @@ def stated(*overrides: str) -> tuple[Problem, Solution]:
     """A problem and the planner's best motion."""
     config = composed(*overrides)
     problem = prepare(config)
-    return problem, global_planner.solve(problem, config.method.global_, config.seed)[0]
+    return problem, global_planner(problem, config.method.global_, Context(config.seed))[0]
 
 
 def solved(*overrides: str) -> tuple[Problem, Evaluation]:
@@ -74,7 +77,7 @@ def test_momentum_and_path_of_the_planner(start: str) -> None:
 def test_momentum_and_path_of_the_other_methods(method: str) -> None:
     config = composed(*ON_BASE, "method.pmke.prediction_step=0.4", "method.pmke.update_interval=0.4")
     problem = prepare(config)
-    solution = pmke.solve(problem, config.method.pmke) if method == "pmke" else lsv.solve(problem, method=method)
+    (solution,) = METHODS[method](problem, config.method.of(method))
     e = evaluate(problem, solution)
     assert e.status is Status.SOLVED, e.message
     assert e.base.floating is not None
@@ -218,10 +221,10 @@ def test_heavy_bases_are_fixed_ones_in_the_limit() -> None:
         config = composed(*words, *base)
         problem = prepare(config)
         found = [
-            lsv.solve(problem),
-            lsv.solve(problem, method="inertia_weighted"),
-            pmke.solve(problem, config.method.pmke),
-            global_planner.solve(problem, config.method.global_, config.seed)[0],
+            lsv(problem)[0],
+            inertia_weighted(problem)[0],
+            pmke(problem, config.method.pmke)[0],
+            global_planner(problem, config.method.global_, Context(config.seed))[0],
         ]
         results = [evaluate(problem, solution) for solution in found]
         return np.array([e.energy_integral[-1] for e in results]), float(results[-1].base.turn.max())

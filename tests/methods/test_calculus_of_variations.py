@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 
 from pipeline.common.errors import InputError
 from pipeline.config.methods import CalculusOfVariationsOptions
-from pipeline.methods.calculus_of_variations import solve
+from pipeline.methods.calculus_of_variations.stationary import calculus_of_variations
 from pipeline.model.kinematics import project
 from pipeline.model.task import PositionTask
 from pipeline.problem.limits import Limits
@@ -31,7 +31,7 @@ def line() -> Problem:
 
 @pytest.fixture(scope="module")
 def stationary(line: Problem) -> list[Solution]:
-    return solve(line, CalculusOfVariationsOptions())
+    return calculus_of_variations(line, CalculusOfVariationsOptions())
 
 
 @pytest.mark.slow
@@ -105,7 +105,7 @@ def test_neighbours_of_a_minimum_cost_more_and_some_of_a_saddle_less(line: Probl
 
 @pytest.mark.slow
 def test_fixed_start(line: Problem) -> None:
-    motions = solve(replace(line, boundary=Boundary.FIXED), CalculusOfVariationsOptions())
+    motions = calculus_of_variations(replace(line, boundary=Boundary.FIXED), CalculusOfVariationsOptions())
     best = motions[0]
     assert best.statistics["kind"] == "minimum"
     np.testing.assert_array_equal(best.trajectory.q[0], Q_INIT)
@@ -123,4 +123,4 @@ def test_unsupported(line: Problem) -> None:
         (replace(line, task=PositionTask(line.task.arm, ("x",))), "redundancy"),
     ):
         with pytest.raises(InputError, match=word):
-            solve(problem, CalculusOfVariationsOptions())
+            calculus_of_variations(problem, CalculusOfVariationsOptions())

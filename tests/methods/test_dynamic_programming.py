@@ -9,7 +9,7 @@ import pytest
 
 from pipeline.common.errors import InputError
 from pipeline.config.methods import DynamicProgrammingOptions
-from pipeline.methods.dynamic_programming import forward, minima, paths, round_trips, solve, starts
+from pipeline.methods.dynamic_programming import dynamic_programming, forward, minima, paths, round_trips, starts
 from pipeline.path.curves import circle
 from pipeline.path.reference import Reference
 from pipeline.path.timing import RaisedCosine
@@ -64,7 +64,7 @@ def test_second_order_from_above(line: Problem) -> None:
 
 
 def test_solution_and_its_grid_error(line: Problem) -> None:
-    solutions = solve(line, DynamicProgrammingOptions())
+    solutions = dynamic_programming(line, DynamicProgrammingOptions())
     best = solutions[0]
     assert best.status is Status.SOLVED
     cost, error = best.statistics["cost"], best.statistics["grid_error"]
@@ -75,7 +75,7 @@ def test_solution_and_its_grid_error(line: Problem) -> None:
 
 
 def test_fixed_start(line: Problem) -> None:
-    (best, *_) = solve(replace(line, boundary=Boundary.FIXED), DynamicProgrammingOptions())
+    (best, *_) = dynamic_programming(replace(line, boundary=Boundary.FIXED), DynamicProgrammingOptions())
     np.testing.assert_array_equal(best.trajectory.q[0], Q_INIT)
     # 0.06093 is the optimum on 101 points; 25 intervals and the nodes add a little.
     assert 0.0609 < best.statistics["cost"] < 0.0635
@@ -83,7 +83,9 @@ def test_fixed_start(line: Problem) -> None:
 
 def test_limits_are_kept(line: Problem, limits: Limits) -> None:
     tight = replace(limits, velocity=np.full(3, 3.2))
-    free, limited = (solve(replace(line, limits=bounds), DynamicProgrammingOptions())[0] for bounds in (limits, tight))
+    free, limited = (
+        dynamic_programming(replace(line, limits=bounds), DynamicProgrammingOptions())[0] for bounds in (limits, tight)
+    )
     for solution, bounds in ((free, limits), (limited, tight)):
         q = solution.trajectory.q
         velocity = np.diff(q, axis=0) / np.diff(solution.trajectory.time)[:, None]
@@ -94,7 +96,7 @@ def test_limits_are_kept(line: Problem, limits: Limits) -> None:
 
 
 def test_impossible_limits(line: Problem, limits: Limits) -> None:
-    (only,) = solve(
+    (only,) = dynamic_programming(
         replace(line, limits=replace(limits, velocity=np.full(3, 0.1))), DynamicProgrammingOptions(nodes=90)
     )
     assert only.status is Status.INFEASIBLE
@@ -106,10 +108,10 @@ def test_cyclic(line: Problem, limits: Limits) -> None:
     start = line.task.value(Q_INIT[None])[0]
     reference = Reference(circle(start, 180.0, 0.05), RaisedCosine(1.0))
     problem = replace(line, reference=reference, boundary=Boundary.CYCLIC)
-    best = solve(replace(problem, limits=limits), DynamicProgrammingOptions())[0]
+    best = dynamic_programming(replace(problem, limits=limits), DynamicProgrammingOptions())[0]
     np.testing.assert_allclose(best.trajectory.q[-1], best.trajectory.q[0], atol=1e-12)
     assert best.statistics["cost"] == pytest.approx(0.0554, abs=best.statistics["grid_error"])
-    free = solve(problem, DynamicProgrammingOptions())[0]
+    free = dynamic_programming(problem, DynamicProgrammingOptions())[0]
     assert 0.0378 < free.statistics["cost"] < 0.0386
 
 
@@ -130,6 +132,6 @@ def test_minima_wrap_around_each_loop() -> None:
 
 def test_unsupported(line: Problem) -> None:
     with pytest.raises(InputError, match="first order"):
-        solve(replace(line, objective=Objective(0.0, 1.0)), DynamicProgrammingOptions())
+        dynamic_programming(replace(line, objective=Objective(0.0, 1.0)), DynamicProgrammingOptions())
     with pytest.raises(InputError, match="does not end where it starts"):
-        solve(replace(line, boundary=Boundary.CYCLIC), DynamicProgrammingOptions())
+        dynamic_programming(replace(line, boundary=Boundary.CYCLIC), DynamicProgrammingOptions())

@@ -15,8 +15,8 @@ from pipeline.common.workers import Workers
 from pipeline.config.compose import checked
 from pipeline.config.run import RunConfig
 from pipeline.evaluation.evaluation import Evaluation, evaluate
-from pipeline.methods import global_planner
-from pipeline.methods.global_planner import refinement
+from pipeline.methods.global_planner.planner import global_planner, refinement
+from pipeline.methods.method import Context
 from pipeline.path.curves import Line
 from pipeline.path.reference import Reference
 from pipeline.problem.problem import Problem
@@ -38,7 +38,7 @@ def configured(*words: str) -> RunConfig:
 def solved(*words: str) -> tuple[Problem, list[Evaluation]]:
     config = configured(*words)
     problem = prepare(config)
-    solutions = global_planner.solve(problem, config.method.global_, config.seed, WORKERS)
+    solutions = global_planner(problem, config.method.global_, Context(config.seed, WORKERS))
     return problem, [evaluate(problem, solution) for solution in solutions]
 
 
@@ -202,7 +202,7 @@ def test_a_path_out_of_reach_is_said() -> None:
     problem = prepare(config)
     start = problem.reference.position(np.zeros(1))[0]
     long = replace(problem, reference=Reference(Line(start, np.array([1.0, 0.0]), 2.0), problem.reference.timing))
-    (only,) = global_planner.solve(long, config.method.global_, 1)
+    (only,) = global_planner(long, config.method.global_, Context(1))
     assert only.status is Status.INFEASIBLE
     assert "reach" in only.message
 
@@ -252,7 +252,7 @@ def test_a_function_of_the_seed_and_not_of_the_number_of_workers() -> None:
     config = configured(*COARSE, "method.global.optimised=4")
     problem = prepare(config)
     first, same, other = (
-        [s.trajectory.q for s in global_planner.solve(problem, config.method.global_, seed, Workers(count))]
+        [s.trajectory.q for s in global_planner(problem, config.method.global_, Context(seed, Workers(count)))]
         for seed, count in ((3, 1), (3, 2), (4, 1))
     )
     assert len(first) == len(same)
@@ -264,9 +264,8 @@ def test_a_function_of_the_seed_and_not_of_the_number_of_workers() -> None:
 def test_progress_counts_every_start_and_never_gets_worse() -> None:
     config = configured(*COARSE, "method.global.optimised=5")
     said: list[tuple[int, int, float]] = []
-    solutions = global_planner.solve(
-        prepare(config), config.method.global_, 1, progress=lambda done, total, best: said.append((done, total, best))
-    )
+    context = Context(progress=lambda done, total, best: said.append((done, total, best)))
+    solutions = global_planner(prepare(config), config.method.global_, context)
     assert [done for done, _, _ in said] == list(range(1, len(said) + 1))
     assert {total for _, total, _ in said} == {len(said)}
     best = [cost for _, _, cost in said]

@@ -9,7 +9,7 @@ import pytest
 from pipeline.common.arrays import Array
 from pipeline.config.methods import LsvOptions
 from pipeline.evaluation.evaluation import evaluate
-from pipeline.methods import lsv
+from pipeline.methods.lsv import lsv
 from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Solution, Status
 
@@ -27,7 +27,7 @@ def test_order_of_the_integrator(problem: Make, integrator: str, order: int, num
 
     def motion(dt: float, integrator: str = integrator) -> Array:
         """At every 0.2 s; at the end of a closed path alone errors cancel."""
-        q = lsv.solve(asked, LsvOptions(dt=dt, integrator=integrator)).trajectory.q
+        q = lsv(asked, LsvOptions(dt=dt, integrator=integrator))[0].trajectory.q
         return q[:: round(0.2 / dt)]
 
     exact = motion(0.0025, "heun")
@@ -38,7 +38,7 @@ def test_order_of_the_integrator(problem: Make, integrator: str, order: int, num
 def test_velocities_are_the_least_that_follow_the_path(problem: Make) -> None:
     """Along the motion qd is the pseudoinverse solution: it has no component in the null space of J."""
     asked = problem(1, 100)
-    motion = lsv.solve(asked, LsvOptions(dt=0.01)).trajectory
+    motion = lsv(asked, LsvOptions(dt=0.01))[0].trajectory
     middle, qd = (motion.q[1:] + motion.q[:-1]) / 2, np.diff(motion.q, axis=0) / 0.01
     null = np.linalg.svd(asked.task.jacobian(middle))[2][:, -1]
     speed = np.linalg.norm(qd, axis=1)
@@ -51,7 +51,7 @@ def test_velocities_are_the_least_that_follow_the_path(problem: Make) -> None:
 def test_the_gain_takes_the_drift_away(problem: Make, number: int) -> None:
     asked = problem(number, 100)
     free, weak, strong = (
-        drift(asked, lsv.solve(asked, LsvOptions(dt=0.02, integrator="euler", gain=k))) for k in (0.0, 1.0, 10.0)
+        drift(asked, lsv(asked, LsvOptions(dt=0.02, integrator="euler", gain=k))[0]) for k in (0.0, 1.0, 10.0)
     )
     assert strong < 0.15 * free
     assert strong < weak < 0.7 * free
@@ -59,7 +59,7 @@ def test_the_gain_takes_the_drift_away(problem: Make, number: int) -> None:
 
 def test_a_gain_too_large_for_the_step_is_not_passed_off_as_a_motion(problem: Make) -> None:
     asked = problem(1, 100)
-    result = evaluate(asked, lsv.solve(asked, LsvOptions(dt=0.05, gain=50.0)))
+    result = evaluate(asked, lsv(asked, LsvOptions(dt=0.05, gain=50.0))[0])
     assert result.tracking_error.max() > 0.1
     assert result.status is not Status.SOLVED
 
@@ -67,14 +67,14 @@ def test_a_gain_too_large_for_the_step_is_not_passed_off_as_a_motion(problem: Ma
 @pytest.mark.parametrize("dt", [0.03, 20.0])
 def test_steps_that_do_not_divide_the_motion_still_end_with_it(problem: Make, dt: float) -> None:
     asked = problem(1, 100)
-    time = lsv.solve(asked, LsvOptions(dt=dt)).trajectory.time
+    time = lsv(asked, LsvOptions(dt=dt))[0].trajectory.time
     assert (time[0], time[-1]) == (0.0, 10.0)
     assert np.ptp(np.diff(time)) < 1e-12
 
 
 def test_a_singularity_has_its_time(problem: Make) -> None:
     asked = problem(3, 100)
-    solution = lsv.solve(asked)
+    solution = lsv(asked)[0]
     assert solution.status is Status.SINGULAR
     assert solution.event_time is not None
     jacobian = asked.task.jacobian(solution.trajectory.q)
@@ -86,16 +86,16 @@ def test_a_singularity_has_its_time(problem: Make) -> None:
 
 def test_the_threshold_decides_what_is_singular(problem: Make) -> None:
     asked = problem(1, 100)
-    calm = lsv.solve(asked)
+    calm = lsv(asked)[0]
     assert calm.status is Status.SOLVED
     smallest = float(calm.statistics["smallest_singular_value_ratio"])
-    assert lsv.solve(asked, LsvOptions(singular_value=1.01 * smallest)).status is Status.SINGULAR
-    assert lsv.solve(asked, LsvOptions(singular_value=0.99 * smallest)).status is Status.SOLVED
+    assert lsv(asked, LsvOptions(singular_value=1.01 * smallest))[0].status is Status.SINGULAR
+    assert lsv(asked, LsvOptions(singular_value=0.99 * smallest))[0].status is Status.SOLVED
 
 
 def test_too_much_drift_is_not_confirmed(problem: Make) -> None:
     asked = problem(2, 100)
     options = LsvOptions(dt=0.5, integrator="euler")
-    far = drift(asked, lsv.solve(asked, options))
-    assert evaluate(asked, lsv.solve(asked, replace(options, max_drift=0.9 * far))).status is Status.UNCONFIRMED
-    assert evaluate(asked, lsv.solve(asked, replace(options, max_drift=1.1 * far))).status is Status.SOLVED
+    far = drift(asked, lsv(asked, options)[0])
+    assert evaluate(asked, lsv(asked, replace(options, max_drift=0.9 * far))[0]).status is Status.UNCONFIRMED
+    assert evaluate(asked, lsv(asked, replace(options, max_drift=1.1 * far))[0]).status is Status.SOLVED

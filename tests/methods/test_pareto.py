@@ -14,7 +14,9 @@ from pipeline.common.workers import Workers
 from pipeline.config.compose import checked
 from pipeline.config.methods import GlobalOptions, ParetoOptions
 from pipeline.evaluation.evaluation import Evaluation, evaluate
-from pipeline.methods import global_planner, pareto
+from pipeline.methods.global_planner.planner import global_planner
+from pipeline.methods.method import Context
+from pipeline.methods.pareto import pareto
 from pipeline.problem.objective import IntegralBounds, Objective
 from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Status
@@ -23,7 +25,7 @@ from pipeline.run.main import CONF
 from pipeline.studies import front
 
 FEW = GlobalOptions(configurations=10, candidates=100, optimised=8)
-OPTIONS = ParetoOptions(steps=4)
+OPTIONS = ParetoOptions(steps=4, planner=FEW)
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +36,7 @@ def problem() -> Problem:
 
 @pytest.fixture(scope="module")
 def evaluations(problem: Problem) -> list[Evaluation]:
-    return [evaluate(problem, solution) for solution in pareto.solve(problem, OPTIONS, FEW)]
+    return [evaluate(problem, solution) for solution in pareto(problem, OPTIONS)]
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +50,7 @@ def table(evaluations: list[Evaluation]) -> pd.DataFrame:
 def test_the_ends_are_the_single_objective_optima(problem: Problem, table: pd.DataFrame) -> None:
     for name, row in (("kinetic_energy", table.iloc[0]), ("torque", table.iloc[-1])):
         weights = {"kinetic_energy": 0.0, "torque": 0.0, name: 1.0}
-        alone = global_planner.solve(replace(problem, objective=Objective(**weights)), FEW)[0]
+        alone = global_planner(replace(problem, objective=Objective(**weights)), FEW)[0]
         found = evaluate(problem, alone)
         best = found.energy_integral[-1] if name == "kinetic_energy" else found.torque_integral[-1]
         assert row["extreme"]
@@ -81,7 +83,7 @@ def test_limits_and_path_are_kept_by_every_point(problem: Problem, evaluations: 
 
 @pytest.mark.slow
 def test_the_front_does_not_depend_on_the_workers(problem: Problem, evaluations: list[Evaluation]) -> None:
-    again = pareto.solve(problem, OPTIONS, FEW, workers=Workers(2))
+    again = pareto(problem, OPTIONS, Context(workers=Workers(2)))
     for solution, e in zip(again, evaluations, strict=True):
         np.testing.assert_array_equal(solution.trajectory.q, e.q)
 
@@ -90,9 +92,7 @@ def test_the_front_does_not_depend_on_the_workers(problem: Problem, evaluations:
 def test_weighting_gives_points_that_the_epsilon_constraint_does_not_beat(
     problem: Problem, table: pd.DataFrame
 ) -> None:
-    weighted = front.table(
-        [evaluate(problem, s) for s in pareto.solve(problem, replace(OPTIONS, method="weighting"), FEW)]
-    )
+    weighted = front.table([evaluate(problem, s) for s in pareto(problem, replace(OPTIONS, method="weighting"))])
     assert weighted is not None
     assert len(weighted) == len(table)
     both = pd.concat([table, weighted])[["kinetic_energy", "torque"]].to_numpy()
@@ -101,8 +101,8 @@ def test_weighting_gives_points_that_the_epsilon_constraint_does_not_beat(
 
 def test_a_bounded_integral_is_met_exactly(problem: Problem) -> None:
     """Bound the energy between its optimum and what the least torques need: the bound binds."""
-    start = global_planner.solve(problem, replace(FEW, optimised=2))[0].trajectory.q
-    free = evaluate(problem, global_planner.solve(problem, replace(FEW, optimised=2))[0])
+    start = global_planner(problem, replace(FEW, optimised=2))[0].trajectory.q
+    free = evaluate(problem, global_planner(problem, replace(FEW, optimised=2))[0])
     bound = 1.05 * free.energy_integral[-1]
     stated = replace(problem, objective=Objective(0.0, 1.0), integral_bounds=IntegralBounds(kinetic_energy=bound))
     q, outcome, _ = Transcription(stated, problem.times, start).solve()
@@ -113,7 +113,7 @@ def test_a_bounded_integral_is_met_exactly(problem: Problem) -> None:
 
 def test_an_extreme_that_cannot_be_found_is_said(problem: Problem) -> None:
     tight = replace(problem, limits=replace(problem.bounds, velocity=np.full(3, 0.5)))
-    (answer,) = pareto.solve(tight, OPTIONS, replace(FEW, optimised=2, candidates=20))
+    (answer,) = pareto(tight, replace(OPTIONS, planner=replace(FEW, optimised=2, candidates=20)))
     assert answer.status is Status.INFEASIBLE
     assert "extreme of kinetic_energy" in answer.message
     assert "velocity limit" in answer.message

@@ -8,13 +8,13 @@ import pytest
 
 from pipeline.build.problem import prepare
 from pipeline.common.errors import InputError
-from pipeline.common.workers import Workers
-from pipeline.config.methods import GlobalOptions, PontryaginOptions
+from pipeline.config.methods import GlobalOptions, PontryaginAsPrintedOptions, PontryaginOptions
 from pipeline.config.run import check
 from pipeline.evaluation.evaluation import evaluate
-from pipeline.methods import calculus_of_variations, global_planner
-from pipeline.methods.pontryagin import boundary_value as pontryagin
-from pipeline.methods.pontryagin.as_printed import as_printed
+from pipeline.methods.calculus_of_variations.stationary import calculus_of_variations
+from pipeline.methods.global_planner.planner import global_planner
+from pipeline.methods.pontryagin.as_printed import pontryagin_as_printed
+from pipeline.methods.pontryagin.boundary_value import pontryagin
 from pipeline.methods.pontryagin.conditions import rates
 from pipeline.model.kinematics import pseudoinverse
 from pipeline.problem.lagrangian import Lagrangian
@@ -54,7 +54,7 @@ def stated(case: str, boundary: str = "fixed", steps: int = 200, **other: object
 
 @cache
 def extremals(case: str, boundary: str) -> list[Solution]:
-    return pontryagin.boundary_value(stated(case, boundary), PontryaginOptions(guesses=6), 1, Workers(1))
+    return pontryagin(stated(case, boundary), PontryaginOptions(guesses=6))
 
 
 @pytest.mark.parametrize(
@@ -69,7 +69,7 @@ def extremals(case: str, boundary: str) -> list[Solution]:
 )
 def test_as_printed(case: str, dt: float, error: float, end: tuple[float, ...]) -> None:
     problem = stated(case)
-    (solution,) = as_printed(problem, PontryaginOptions(dt=dt))
+    (solution,) = pontryagin_as_printed(problem, PontryaginAsPrintedOptions(dt=dt))
     recomputed = evaluate(problem, solution)
     assert recomputed.tracking_error[-1] == pytest.approx(error, abs=1e-9)
     np.testing.assert_allclose(solution.trajectory.q[-1], end, atol=2e-9)
@@ -119,7 +119,7 @@ def test_a_free_start_is_better(case: str) -> None:
     assert best.statistics["transversality_end"] < 1e-8
     assert evaluate(stated(case, "free"), best).confirmed
     if case != "case4":  # whose scan takes long; its best is -521.3533775
-        scanned = calculus_of_variations.solve(stated(case, "free"))
+        scanned = calculus_of_variations(stated(case, "free"))
         assert best.statistics["integral"] == pytest.approx(scanned[0].statistics["integral"], rel=1e-8)
     else:
         assert best.statistics["integral"] == pytest.approx(-521.3533775053, rel=1e-9)
@@ -128,8 +128,8 @@ def test_a_free_start_is_better(case: str) -> None:
 @pytest.mark.slow
 def test_extremals_and_their_kinds_agree_with_the_calculus_of_variations() -> None:
     """Shooting and scanning on one side, collocation on the other: all three extremals of case 3, two minima, a saddle."""
-    scanned = calculus_of_variations.solve(stated("case3"))
-    found = pontryagin.boundary_value(stated("case3"), PontryaginOptions(), 1, Workers(1))
+    scanned = calculus_of_variations(stated("case3"))
+    found = pontryagin(stated("case3"), PontryaginOptions())
     assert len(scanned) == len(found) == 3
     for one, other in zip(scanned, found, strict=True):
         assert one.statistics["integral"] == pytest.approx(other.statistics["integral"], rel=1e-8)
@@ -139,8 +139,8 @@ def test_extremals_and_their_kinds_agree_with_the_calculus_of_variations() -> No
 @pytest.mark.slow
 def test_direct_transcription_converges_to_the_extremal_with_order_two() -> None:
     problem = stated("case2", steps=800)
-    best = global_planner.solve(problem, GlobalOptions(candidates=60, optimised=4), 1, Workers(1))[:1]
-    own = pontryagin.boundary_value(problem, PontryaginOptions(guesses=4), 1, Workers(1))[:1]
+    best = global_planner(problem, GlobalOptions(candidates=60, optimised=4))[:1]
+    own = pontryagin(problem, PontryaginOptions(guesses=4))[:1]
     table = convergence.table(problem, best + own)
     assert table is not None
     assert len(table) == 4
@@ -155,7 +155,7 @@ def test_what_it_does_not_serve_is_one_line() -> None:
         ({"limits": {"velocity": 3.0}}, "limits"),
     ):
         with pytest.raises(InputError, match=word):
-            pontryagin.check(stated("case1", **other))
+            pontryagin(stated("case1", **other))
     problem = stated("case1")
     with pytest.raises(InputError, match="torque"):
-        pontryagin.check(replace(problem, objective=replace(problem.objective, velocity_norm=0.0, kinetic_energy=0.0)))
+        pontryagin(replace(problem, objective=replace(problem.objective, velocity_norm=0.0, kinetic_energy=0.0)))

@@ -10,7 +10,7 @@ from pipeline.build.problem import prepare
 from pipeline.common.arrays import Array
 from pipeline.common.errors import ConfigError
 from pipeline.evaluation.evaluation import evaluate
-from pipeline.methods import global_planner
+from pipeline.methods.global_planner.planner import global_planner
 from pipeline.model.arm import Arm
 from pipeline.model.clearance import Clearance, Obstacles
 from pipeline.problem.problem import Problem
@@ -131,9 +131,9 @@ def line(margin: float, **changes: str) -> Problem:
 def test_the_planner_keeps_its_clearance_between_knots_too() -> None:
     free = replace(line(0.03), obstacles=None)
     there = line(0.03)
-    without = global_planner.solve(free)[0]
+    without = global_planner(free)[0]
     assert evaluate(there, without).clearance_between < 0.02, "the ball is not in the way: the test shows nothing"
-    best = evaluate(there, global_planner.solve(there)[0])
+    best = evaluate(there, global_planner(there)[0])
     assert best.status is Status.SOLVED
     assert best.clearance.min() >= 0.03 - 1e-9
     assert best.clearance_between >= 0.03 - 1e-9
@@ -142,7 +142,7 @@ def test_the_planner_keeps_its_clearance_between_knots_too() -> None:
 
 def test_a_motion_that_breaks_a_promised_clearance_is_unconfirmed() -> None:
     there = line(0.03)
-    through = global_planner.solve(replace(there, obstacles=None))[0]
+    through = global_planner(replace(there, obstacles=None))[0]
     judged = evaluate(
         there,
         Solution(
@@ -171,7 +171,7 @@ def test_an_obstacle_on_the_path_is_named() -> None:
         "+obstacles.shapes.wall={kind: box, center: [0.563, 0.24, 0.0], size: [0.04, 0.04, 0.1]}",
         "obstacles.margin=0.01",
     )
-    solution = global_planner.solve(prepare(blocked), blocked.method.global_)[0]
+    solution = global_planner(prepare(blocked), blocked.method.global_)[0]
     assert not solution.found
     assert "clearance limit of link" in solution.message
     assert "from wall (0.01 m) cannot be met" in solution.message

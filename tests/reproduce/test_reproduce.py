@@ -363,7 +363,7 @@ def reproduce_here(
 def test_a_line_per_experiment_and_nothing_twice(
     reproduce_here: Callable[..., tuple[int, str, str]], tmp_path: Path
 ) -> None:
-    words = ("pontryagin", "methods=[pontryagin]", "method.pontryagin.formulation=as_printed")
+    words = ("pontryagin", "methods=[pontryagin_as_printed]")
     code, out, error = reproduce_here(*words)
     assert (code, error) == (0, "")
     cases = ("case1", "case2", "case3", "case4a", "case4b")

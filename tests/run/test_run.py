@@ -16,16 +16,19 @@ from hydra import compose, initialize_config_dir
 
 from pipeline.artifacts.recording.blueprint import slug
 from pipeline.artifacts.recording.recording import read_series
+from pipeline.build.problem import prepare
 from pipeline.common.errors import ConfigError, PathError, RobotError
 from pipeline.common.workers import Workers
 from pipeline.config import run as schema
 from pipeline.config.compose import checked
 from pipeline.config.methods import GlobalOptions
 from pipeline.evaluation.evaluation import Evaluation, evaluate
-from pipeline.methods import global_planner, lsv
-from pipeline.methods.pmke import predictive as pmke
+from pipeline.methods.global_planner.planner import global_planner
+from pipeline.methods.lsv import lsv
+from pipeline.methods.method import Context
+from pipeline.methods.pmke.predictive import pmke
 from pipeline.problem.problem import Boundary, Problem
-from pipeline.problem.solution import Status, no_progress
+from pipeline.problem.solution import Status
 from pipeline.run import run
 from tests.run.test_main import ROOT, Answer, call, command
 from tests.support import RUN_FILES
@@ -40,7 +43,7 @@ def configured(*words: str) -> schema.RunConfig:
 
 
 def prepared(*words: str) -> Problem:
-    return run.prepare(configured(*words))
+    return prepare(configured(*words))
 
 
 def strict_json(text: str) -> dict[str, Any]:
@@ -158,9 +161,9 @@ class TestTraj3:
 @functools.cache
 def solved(number: int, method: str) -> tuple[Problem, list[Evaluation]]:
     config = configured(f"+experiment=traj{number}", f"methods=[{method}]", *FEW)
-    problem = run.prepare(config)
-    ((solutions, seconds),) = run.solve(problem, config, Workers(min(2, os.cpu_count() or 1)), no_progress)
-    assert seconds > 0
+    problem = prepare(config)
+    solutions, seconds = run.solve(problem, config, Context(1, Workers(min(2, os.cpu_count() or 1))))
+    assert seconds[method] > 0
     return problem, [evaluate(problem, solution) for solution in solutions]
 
 
@@ -266,7 +269,7 @@ ROWS = np.array([[0.45, 0.02], [0.40, 0.06], [0.36, 0.05], [0.33, 0.10]])
 @pytest.mark.parametrize("relative", [False, True])
 def test_way_points(points: Callable[[Any], Path], relative: bool) -> None:
     config = configured("path=waypoints", f"path.file={points(ROWS)}", f"path.relative={str(relative).lower()}")
-    problem = run.prepare(config)
+    problem = prepare(config)
     here = prepared().task.value(np.array([config.robot.q_init]))[0]
     shift = here - ROWS[0] if relative else 0.0
     start = problem.task.value(problem.q_init[None])[0]
@@ -276,8 +279,8 @@ def test_way_points(points: Callable[[Any], Path], relative: bool) -> None:
         assert np.linalg.norm(dense - point, axis=1).min() < 1e-4
     if relative:
         np.testing.assert_allclose(problem.q_init, config.robot.q_init, atol=1e-9)
-    solutions = [lsv.solve(problem), pmke.solve(problem)]
-    solutions += global_planner.solve(problem, GlobalOptions(candidates=60, optimised=3))
+    solutions = [lsv(problem)[0], pmke(problem)[0]]
+    solutions += global_planner(problem, GlobalOptions(candidates=60, optimised=3))
     assert all(evaluate(problem, solution).status is Status.SOLVED for solution in solutions)
 
 
@@ -292,14 +295,14 @@ def test_a_path_can_say_where_it_starts() -> None:
     np.testing.assert_allclose(moved, [0.40, 0.05], atol=1e-9)
     np.testing.assert_allclose(problem.reference.position(np.zeros(1))[0], [0.40, 0.05], atol=1e-12)
     assert np.abs(problem.q_init - [0.0, 0.327, -0.754]).max() > 1e-2
-    assert evaluate(problem, lsv.solve(problem)).status is Status.SOLVED
+    assert evaluate(problem, lsv(problem)[0]).status is Status.SOLVED
 
 
 @pytest.mark.parametrize("law", ["constant_speed", "quintic", "raised_cosine"])
 def test_timing_laws_run(law: str) -> None:
     problem = prepared("+experiment=traj1", f"timing={law}", "timing.duration=10.0", "timing.steps=26")
-    solutions = [lsv.solve(problem), pmke.solve(problem)]
-    solutions += global_planner.solve(problem, GlobalOptions(candidates=60, optimised=3))
+    solutions = [lsv(problem)[0], pmke(problem)[0]]
+    solutions += global_planner(problem, GlobalOptions(candidates=60, optimised=3))
     motions = [evaluate(problem, solution) for solution in solutions]
     assert [motion.status for motion in motions] == [Status.SOLVED] * len(motions)
     costs = [motion.energy_integral_spline for motion in motions[:3]]
@@ -373,4 +376,4 @@ def test_both_models_of_the_arm() -> None:
 )
 def test_python_callers_get_the_same_errors(values: dict[str, Any], error: type[Exception], named: str) -> None:
     with pytest.raises(error, match=named):
-        run.prepare(schema.check(values))
+        prepare(schema.check(values))

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from pipeline.config.methods import DynamicProgrammingOptions, GlobalOptions
-from pipeline.methods import dynamic_programming, global_planner
+from pipeline.methods.dynamic_programming import dynamic_programming
+from pipeline.methods.global_planner.planner import global_planner
 from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Solution, Status, Trajectory
 from pipeline.studies import certificate
@@ -20,12 +21,12 @@ def line() -> Problem:
 
 @pytest.fixture(scope="module")
 def optima(line: Problem) -> list[Solution]:
-    return global_planner.solve(line, GlobalOptions(starts="dynamic_programming"))
+    return global_planner(line, GlobalOptions(starts="dynamic_programming"))
 
 
 @pytest.fixture(scope="module")
 def on_grid(line: Problem) -> Solution:
-    return dynamic_programming.solve(line, DynamicProgrammingOptions(nodes=180, intervals=13))[0]
+    return dynamic_programming(line, DynamicProgrammingOptions(nodes=180, intervals=13))[0]
 
 
 def test_the_true_optimum_is_certified(line: Problem, optima: list[Solution], on_grid: Solution) -> None:

@@ -12,7 +12,7 @@ from pipeline.artifacts.figures import closed_loop as closed_loop_figure
 from pipeline.build.problem import prepare
 from pipeline.config.studies import ClosedLoopConfig
 from pipeline.evaluation.evaluation import Evaluation, evaluate
-from pipeline.methods import lsv
+from pipeline.methods.lsv import lsv
 from pipeline.model.arm import Arm
 from pipeline.model.task import PositionTask
 from pipeline.problem.limits import Limits
@@ -26,7 +26,7 @@ OPTIONS = ClosedLoopConfig()
 
 def case_of(*words: str) -> Case:
     problem = prepare(composed("path.length=0.15", "timing.duration=2", *words))
-    return problem, evaluate(problem, lsv.solve(problem))
+    return problem, evaluate(problem, lsv(problem)[0])
 
 
 @pytest.fixture(scope="module")
@@ -127,7 +127,7 @@ def test_gravity_payload_rotors_and_a_placed_base(case: Case) -> None:
         task=task,
         reference=replace(problem.reference, geometry=replace(problem.reference.geometry, start=start)),
     )  # type: ignore[type-var]
-    motion = evaluate(moved, lsv.solve(moved))
+    motion = evaluate(moved, lsv(moved)[0])
     loop = simulate(moved, motion, OPTIONS)
     assert loop.diverged is None
     assert joint_error(loop) < 1e-3

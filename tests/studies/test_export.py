@@ -10,7 +10,7 @@ import pytest
 from pipeline.build.problem import prepare
 from pipeline.config.methods import GlobalOptions
 from pipeline.evaluation.evaluation import Evaluation, evaluate
-from pipeline.methods import global_planner
+from pipeline.methods.global_planner.planner import global_planner
 from pipeline.model.clearance import Obstacles
 from pipeline.path.timing import ConstantSpeed
 from pipeline.problem.limits import Limits
@@ -27,7 +27,7 @@ Case = tuple[Problem, Evaluation]
 
 def solved(*words: str) -> Case:
     problem = prepare(composed(*words))
-    return problem, evaluate(problem, global_planner.solve(problem, FEW)[0])
+    return problem, evaluate(problem, global_planner(problem, FEW)[0])
 
 
 @pytest.fixture(scope="module")
@@ -135,8 +135,8 @@ def test_the_best_motion_is_the_cheapest_that_hits_nothing() -> None:
     config = composed(*words)
     free = prepare(config)
     there = replace(free, obstacles=Obstacles((ball,), 0.03))
-    through = evaluate(there, replace(global_planner.solve(free, FEW)[0], method="lsv", limits_kept=()))
-    around = evaluate(there, global_planner.solve(there, FEW)[0])
+    through = evaluate(there, replace(global_planner(free, FEW)[0], method="lsv", limits_kept=()))
+    around = evaluate(there, global_planner(there, FEW)[0])
     assert through.status is around.status is Status.SOLVED
     assert through.objective < around.objective
     sent = compute(there, config, [through, around]).exported

@@ -13,7 +13,7 @@ from pipeline.common.workers import Workers
 from pipeline.config import documents
 from pipeline.config.studies import IdentificationConfig
 from pipeline.evaluation.evaluation import evaluate
-from pipeline.methods import lsv
+from pipeline.methods.lsv import lsv
 from pipeline.model.arm import Arm
 from pipeline.reproduce.results import Results
 from pipeline.studies import identification
@@ -63,7 +63,7 @@ def test_other_masses_change_the_dynamics_and_nothing_else(as_printed: Arm, rng:
 
 def test_numbers_are_those_of_the_evaluation() -> None:
     problem = prepare(composed("+experiment=traj4"))
-    solution = lsv.solve(problem)
+    solution = lsv(problem)[0]
     e, found = evaluate(problem, solution), identification.quantities(problem, solution.trajectory.q)
     assert found["kinetic_energy_integral"] == pytest.approx(e.energy_integral[-1], rel=1e-9)
     assert found["torque_integral"] == pytest.approx(e.torque_integral[-1], rel=1e-6)

@@ -9,8 +9,9 @@ from scipy.interpolate import BSpline
 from pipeline.common.arrays import Array
 from pipeline.config.methods import PmkeOptions
 from pipeline.evaluation.evaluation import evaluate
-from pipeline.methods import lsv
-from pipeline.methods.pmke import predictive as pmke
+from pipeline.methods.lsv import lsv
+from pipeline.methods.pmke import predictive
+from pipeline.methods.pmke.predictive import pmke
 from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Status
 
@@ -22,14 +23,14 @@ Seen = list[tuple[Array, Array, Array, Array, BSpline]]
 def predictions(monkeypatch: pytest.MonkeyPatch) -> Seen:
     """Knots (h + 1,), points (h + 1, n), qd, qdd at the start and the spline of every prediction made."""
     seen: Seen = []
-    interpolate = pmke._Predictor._interpolate
+    interpolate = predictive._Predictor._interpolate
 
-    def watched(self: pmke._Predictor, times: Array, points: Array, qd: Array, qdd: Array) -> BSpline:
+    def watched(self: predictive._Predictor, times: Array, points: Array, qd: Array, qdd: Array) -> BSpline:
         spline = interpolate(self, times, points, qd, qdd)
         seen.append((times, points, qd, qdd, spline))
         return spline
 
-    monkeypatch.setattr(pmke._Predictor, "_interpolate", watched)
+    monkeypatch.setattr(predictive._Predictor, "_interpolate", watched)
     return seen
 
 
@@ -39,7 +40,7 @@ def test_predictions_are_on_the_path_and_join_the_motion(
     problem: Make, predictions: Seen, horizon: int, interpolation: str
 ) -> None:
     asked = problem(1, 100)
-    solution = pmke.solve(asked, PmkeOptions(dt=0.02, horizon=horizon, interpolation=interpolation))
+    solution = pmke(asked, PmkeOptions(dt=0.02, horizon=horizon, interpolation=interpolation))[0]
     result = evaluate(asked, solution)
     assert result.status is Status.SOLVED
     log = solution.statistics["predictions"]
@@ -59,13 +60,13 @@ def test_predictions_are_on_the_path_and_join_the_motion(
             np.testing.assert_allclose(spline(times[0], 2), qdd, atol=1e-8)
             np.testing.assert_allclose(spline(times[-1], 2), 0.0, atol=1e-8)
     # Looking ahead pays: this motion costs LSV half as much again.
-    baseline = evaluate(asked, lsv.solve(asked)).energy_integral[-1]
+    baseline = evaluate(asked, lsv(asked)[0]).energy_integral[-1]
     assert result.energy_integral[-1] < (0.9 if horizon == 1 else 0.75) * baseline
 
 
 def test_the_energy_of_a_prediction_is_that_of_its_knots(problem: Make, predictions: Seen) -> None:
     asked = problem(2, 100)
-    solution = pmke.solve(asked)
+    solution = pmke(asked)[0]
     arm = asked.task.arm
     for (_, points, *_), entry in zip(predictions, solution.statistics["predictions"], strict=True):
         qd = np.diff(points, axis=0)  # knots are a second apart
@@ -83,7 +84,7 @@ def test_the_energy_of_a_prediction_is_that_of_its_knots(problem: Make, predicti
 )
 def test_a_window_longer_than_the_motion_is_cut(problem: Make, options: PmkeOptions, horizon: int) -> None:
     asked = problem(1, 100)
-    solution = pmke.solve(asked, options)
+    solution = pmke(asked, options)[0]
     assert solution.status is Status.SOLVED
     assert solution.statistics["horizon"] == horizon
     assert all(0.0 <= entry["time"] < 10.0 for entry in solution.statistics["predictions"])
@@ -95,31 +96,31 @@ def test_a_window_longer_than_the_motion_is_cut(problem: Make, options: PmkeOpti
 def test_a_prediction_at_every_step(problem: Make, update: float) -> None:
     """Update interval equal to dt, or below it: a prediction at every step while a window of 2 s is left."""
     asked = problem(1, 100)
-    solution = pmke.solve(asked, PmkeOptions(dt=0.1, update_interval=update))
+    solution = pmke(asked, PmkeOptions(dt=0.1, update_interval=update))[0]
     log = solution.statistics["predictions"]
     np.testing.assert_allclose([entry["time"] for entry in log], np.arange(81) / 10, atol=1e-9)
     assert solution.status is Status.SOLVED
-    baseline = evaluate(asked, lsv.solve(asked)).energy_integral[-1]
+    baseline = evaluate(asked, lsv(asked)[0]).energy_integral[-1]
     assert 5.96e-4 < evaluate(asked, solution).energy_integral[-1] < 0.8 * baseline
 
 
 def test_an_update_interval_beyond_the_motion_predicts_once(problem: Make) -> None:
-    solution = pmke.solve(problem(1, 100), PmkeOptions(dt=0.05, update_interval=100.0))
+    solution = pmke(problem(1, 100), PmkeOptions(dt=0.05, update_interval=100.0))[0]
     assert len(solution.statistics["predictions"]) == 1
 
 
 def test_the_gain_takes_the_drift_away(problem: Make) -> None:
     asked = problem(2, 100)
     free, held = (
-        evaluate(asked, pmke.solve(asked, PmkeOptions(dt=0.02, gain=k))).tracking_error.max() for k in (0.0, 10.0)
+        evaluate(asked, pmke(asked, PmkeOptions(dt=0.02, gain=k))[0]).tracking_error.max() for k in (0.0, 10.0)
     )
     assert held < 0.3 * free
 
 
 def test_predictions_that_fail_are_said(problem: Make, monkeypatch: pytest.MonkeyPatch) -> None:
-    solve = pmke.Window.solve
-    monkeypatch.setattr(pmke.Window, "solve", lambda *a, **k: solve(*a, **{**k, "max_iterations": 0}))
+    solve = predictive.Window.solve
+    monkeypatch.setattr(predictive.Window, "solve", lambda *a, **k: solve(*a, **{**k, "max_iterations": 0}))
     monkeypatch.setattr("pipeline.methods.pmke.window.quasi_newton", lambda cost, rows, x, **_: x)
-    solution = pmke.solve(problem(1, 100), PmkeOptions(dt=0.05))
+    solution = pmke(problem(1, 100), PmkeOptions(dt=0.05))[0]
     assert solution.status is Status.NOT_CONVERGED
     assert "17 of 17 predictions did not converge, the first at t = 0.00 s" in solution.message

@@ -6,18 +6,18 @@ import numpy as np
 import pytest
 
 from pipeline.build.problem import prepare
-from pipeline.config.methods import PmkeOptions
+from pipeline.config.methods import PmkeOptions, RecedingOptions
 from pipeline.evaluation.evaluation import evaluate
-from pipeline.methods import global_planner
-from pipeline.methods.pmke import predictive as pmke
-from pipeline.methods.pmke.receding import _knots
+from pipeline.methods.global_planner.planner import global_planner
+from pipeline.methods.pmke.predictive import pmke
+from pipeline.methods.pmke.receding import _knots, receding
 from pipeline.problem.costs import integrals
 from pipeline.problem.objective import Objective
 from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Status
 from tests.support import composed
 
-WINDOW = PmkeOptions(limits=True, prediction_step=0.2, horizon=5, update_interval=0.6)
+WINDOW = RecedingOptions(prediction_step=0.2, horizon=5, update_interval=0.6)
 
 
 def trajectory3(*overrides: str) -> Problem:
@@ -26,13 +26,13 @@ def trajectory3(*overrides: str) -> Problem:
 
 def test_limits_hold_at_every_executed_knot_and_the_cost_is_near_the_optimum() -> None:
     asked = trajectory3("limits.velocity=0.32", "limits=joint")
-    done = pmke.solve(asked, WINDOW)
+    done = receding(asked, WINDOW)[0]
     judged = evaluate(asked, done)
     assert judged.status is Status.SOLVED, judged.message
     assert max(judged.limit_excess.values()) <= 1e-6
     assert judged.limit_excess["velocity"] > -0.2, "the limit is not felt: the test shows nothing"
     assert judged.tracking_error.max() < 1e-7
-    best = evaluate(asked, global_planner.solve(asked)[0])
+    best = evaluate(asked, global_planner(asked)[0])
     assert judged.objective < 1.1 * best.objective
     log = done.statistics["predictions"]
     assert [round(entry["time"], 6) for entry in log] == pytest.approx(np.arange(0, 10, 0.6).tolist())
@@ -54,12 +54,12 @@ def test_a_window_knows_the_velocity_it_comes_with() -> None:
 
 def test_torque_as_the_objective_of_the_predictions_costs_less_torque() -> None:
     asked = trajectory3()
-    options = replace(WINDOW, limits=False, prediction_step=0.5, update_interval=0.5, horizon=4)
-    interpolated = evaluate(asked, pmke.solve(asked, replace(options, objective="torque")))
+    options = PmkeOptions(prediction_step=0.5, update_interval=0.5, horizon=4, objective="torque")
+    interpolated = evaluate(asked, pmke(asked, options)[0])
     assert interpolated.status is Status.SOLVED
-    by_energy = evaluate(asked, pmke.solve(asked, WINDOW))
-    by_torque = evaluate(asked, pmke.solve(asked, replace(WINDOW, objective="torque")))
-    best = evaluate(asked, global_planner.solve(replace(asked, objective=Objective(0.0, 1.0)))[0])
+    by_energy = evaluate(asked, receding(asked, WINDOW)[0])
+    by_torque = evaluate(asked, receding(asked, replace(WINDOW, objective="torque"))[0])
+    best = evaluate(asked, global_planner(replace(asked, objective=Objective(0.0, 1.0)))[0])
     assert by_torque.status is by_energy.status is Status.SOLVED
     assert best.torque_integral[-1] * 0.9 < by_torque.torque_integral[-1] < 0.8 * by_energy.torque_integral[-1]
     assert by_torque.energy_integral[-1] > by_energy.energy_integral[-1]
@@ -67,7 +67,7 @@ def test_torque_as_the_objective_of_the_predictions_costs_less_torque() -> None:
 
 def test_what_cannot_be_met_is_said() -> None:
     asked = trajectory3("limits.velocity=0.12", "timing.steps=25")
-    done = pmke.solve(asked, WINDOW)
+    done = receding(asked, WINDOW)[0]
     assert not done.found
     assert done.status is Status.INFEASIBLE
     assert "the velocity limit of joint" in done.message

@@ -1,0 +1,149 @@
+"""Every method on every kind of problem: it returns motions, or refuses with one line, alike from Python and a command."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.build.problem import prepare
+from pipeline.common.errors import InputError
+from pipeline.config.methods import GlobalOptions, ParetoOptions
+from pipeline.config.run import RunConfig
+from pipeline.methods.method import ANY, Context, Serves
+from pipeline.methods.registry import METHODS
+from pipeline.problem.problem import Boundary
+from pipeline.problem.solution import Status
+from pipeline.run.solve import solve, state
+from tests.support import composed
+
+FEW = ("configurations=4", "candidates=30", "optimised=2", "same_path=2.0")
+SMALL = (
+    *(f"method.global.{word}" for word in FEW),
+    *("timing.steps=8", "path.length=0.15", "timing.duration=4", "method.lsv.dt=0.1", "method.inertia_weighted.dt=0.1"),
+    *("method.pmke.dt=0.02", "method.pareto.steps=2", "method.pareto.rounds=0", "method.receding.update_interval=2"),
+    *("method.dynamic_programming.nodes=60", "method.dynamic_programming.intervals=6"),
+    *("method.calculus_of_variations.spacing=0.3", "method.calculus_of_variations.refinements=1"),
+    *("method.calculus_of_variations.max_speed=0.5", "method.pontryagin.guesses=2", "method.pontryagin.intervals=10"),
+)
+CIRCLE = tuple(word for word in SMALL if not word.startswith("path."))
+PROBLEMS = {
+    "fixed": SMALL,
+    "free": (*SMALL, "boundary=free"),
+    "cyclic": (*CIRCLE, "path=circle", "path.radius=0.03", "boundary=cyclic"),
+    "limits": (*SMALL, "limits=joint"),
+    "torque": (*SMALL, "objective=torque"),
+    "floating": (*SMALL, "base=free", "base.mass=20", "base.inertia=1"),
+    "held": (*SMALL, "objective=reaction", "method.pareto.objectives=[reaction_force,torque]"),
+    "r = 2": (*SMALL, "robot=planar4r"),
+}
+BASELINES = {"lsv", "inertia_weighted", "pmke", "receding", "global", "pareto"}
+SERVED = {
+    "fixed": set(METHODS),
+    "free": set(METHODS),
+    "cyclic": BASELINES | {"dynamic_programming"},
+    "limits": BASELINES | {"dynamic_programming"},
+    "torque": BASELINES,
+    "floating": BASELINES,
+    "held": BASELINES,
+    "r = 2": BASELINES | {"pontryagin", "pontryagin_as_printed"},
+}
+WHY = {  # a word of the refusal, where the problem's name is none
+    "floating": "the base moves",
+    "held": "held for its reaction",
+    "r = 2": "the redundancy degree is 2",
+}
+
+
+def asked(problem: str, method: str) -> RunConfig:
+    return composed(*PROBLEMS[problem], f"methods=[{method}]")
+
+
+@pytest.mark.parametrize(("name", "problem"), [(m, p) for p in PROBLEMS for m in METHODS if m not in SERVED[p]])
+def test_a_refusal_is_one_line_and_the_same_from_python_and_from_the_command_line(name: str, problem: str) -> None:
+    config = asked(problem, name)
+    with pytest.raises(InputError, match=rf"^{name}: .*{WHY.get(problem, problem)}.*; supported are ") as refused:
+        METHODS[name](prepare(config), config.method.of(name))
+    with pytest.raises(InputError) as by_command:
+        state(config)
+    line, others = str(by_command.value).split("; methods that serve this problem: ")
+    assert line == str(refused.value)
+    assert "\n" not in line
+    assert set(others.split(", ")) == SERVED[problem]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "problem"), [(m, p) for p in PROBLEMS for m in METHODS if m in SERVED[p]])
+def test_what_is_not_refused_is_solved(name: str, problem: str) -> None:
+    config = asked(problem, name)
+    stated = state(config)
+    solutions = METHODS[name](stated, config.method.of(name))
+    assert [solution.method for solution in solutions] == [name] * len(solutions)
+    assert [solution.optimum for solution in solutions] == list(range(1, len(solutions) + 1))
+    for solution in solutions:
+        time, q = solution.trajectory.time, solution.trajectory.q
+        assert solution.found
+        assert solution.status is Status.SOLVED, solution.message
+        assert q.shape == (len(time), stated.task.arm.n)
+        gap = stated.task.error(q, stated.reference.position(time))
+        assert np.abs(gap).max() <= max(1e-6, min(solution.tracking_tolerance, 0.1))
+
+
+def test_the_names_are_the_keys_and_titles_and_colours_are_their_own() -> None:
+    assert all(name == method.name for name, method in METHODS.items())
+    assert len({method.title for method in METHODS.values()}) == len(METHODS)
+    assert all(len(method.color) == 7 and int(method.color[1:], 16) >= 0 for method in METHODS.values())
+
+
+def test_defaults_are_those_of_the_options_and_the_context() -> None:
+    problem = prepare(asked("fixed", "lsv"))
+    own, given = (
+        METHODS["lsv"](problem)[0],
+        METHODS["lsv"](problem, METHODS["lsv"].options(), Context())[0],
+    )
+    np.testing.assert_array_equal(own.trajectory.q, given.trajectory.q)
+
+
+def test_a_run_calls_its_methods_in_order_with_their_own_options() -> None:
+    config = composed(*SMALL, "methods=[inertia_weighted,lsv]", "method.lsv.dt=0.2")
+    solutions, seconds = solve(prepare(config), config, Context())
+    assert [solution.method for solution in solutions] == list(seconds) == ["inertia_weighted", "lsv"]
+    assert [len(solution.trajectory.time) for solution in solutions] == [41, 21]
+    assert all(second > 0 for second in seconds.values())
+
+
+@pytest.mark.parametrize("starts", ["dynamic_programming", "both"])
+def test_starts_by_dynamic_programming_serve_what_it_serves(starts: str) -> None:
+    options = GlobalOptions(starts=starts)
+    assert METHODS["global"].why_not(prepare(asked("limits", "global")), options) is None
+    for problem in ("torque", "floating", "r = 2"):
+        line = METHODS["global"].why_not(prepare(asked(problem, "global")), options)
+        assert line is not None
+        assert line.startswith(f"global: method.global.starts = {starts}: dynamic_programming: ")
+        assert line.endswith("; starts = population serves every problem")
+
+
+def test_a_front_is_refused_where_the_planner_is_or_two_integrals_are_not_given() -> None:
+    pareto, problem = METHODS["pareto"], prepare(asked("fixed", "pareto"))
+    by_grid = ParetoOptions(planner=GlobalOptions(starts="both"))
+    line = pareto.why_not(problem, by_grid)
+    assert line is not None
+    assert "the objective holds a torque or reaction integral" in line
+    for wrong in (["torque"], ["torque", "kinetic_energy", "base_rotation"]):
+        with pytest.raises(InputError, match="a front is one of two integrals"):
+            pareto(problem, ParetoOptions(objectives=wrong))
+
+
+def test_a_cycle_needs_a_closed_path() -> None:
+    open_path = replace(prepare(asked("fixed", "lsv")), boundary=Boundary.CYCLIC)
+    for name in SERVED["cyclic"]:
+        with pytest.raises(InputError, match="the path does not end where it starts"):
+            METHODS[name](open_path)
+
+
+def test_what_serves_everything_says_so() -> None:
+    assert str(ANY) == "is every problem"
+    assert str(Serves(redundancy=1, boundaries=frozenset((Boundary.FREE, Boundary.FIXED)), constraints=False)) == (
+        "are r = 1; boundary fixed or free; no limits or obstacles"
+    )
