@@ -120,9 +120,7 @@ def _in_one_line(error: Exception) -> str:
     message = str(error.__cause__ or error)
     if isinstance(error, OverrideParseException):
         message = f"in {' '.join(sys.argv[1:])}: {error}"
-    unknown = re.search(
-        r"Could not (?:override|append to config\.?[^']*|find) '([^']+)'", str(error)
-    )
+    unknown = re.search(r"Could not (?:override|append to config\.?[^']*|find) '([^']+)'", str(error))
     if unknown:
         return str(unknown_key(unknown.group(1), _keys_beside(unknown.group(1))))
     return " ".join(line.strip() for line in message.splitlines() if line.strip() and not line.startswith("See http"))

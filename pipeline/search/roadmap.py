@@ -40,15 +40,19 @@ class Roadmap:
         nodes = _Sampler(manifold, times, self.nodes, rng).layers()
         if min(map(len, nodes)) == 0:
             return none
-        edges = edge_costs(manifold, times, nodes)
         closed = problem.boundary is Boundary.CYCLIC
-        paths, costs = closed_paths(edges) if closed else through_every_node(edges)
+        cheapest = closed_paths if closed else through_every_node
+        paths, costs = cheapest(edge_costs(manifold, times, nodes, problem.bounds.velocity))
+        if not len(paths):  # too fast everywhere: what is nearest to the limits is for the solver to find
+            paths, costs = cheapest(edge_costs(manifold, times, nodes, np.full(manifold.n, np.inf)))
         coarse = np.stack([layer[column] for layer, column in zip(nodes, paths.T, strict=True)], axis=1)
         turns = np.cumsum(manifold.wrap(np.diff(coarse, axis=1)), axis=1)
         coarse[:, 1:] = coarse[:, :1] + turns
         if closed:  # as a motion, not only up to whole turns
             back = np.abs(coarse[:, -1] - coarse[:, 0]).max(axis=1) < CLOSED
             coarse, costs = coarse[back], costs[back]
+        if not len(coarse):
+            return none
         revolute = problem.task.arm.description.revolute
         motions = _on_grid(manifold, times, coarse[diverse(coarse, costs, PRICED * self.most, APART, revolute)], grid)
         if not len(motions):
@@ -57,10 +61,10 @@ class Roadmap:
         return motions[chosen]
 
 
-def edge_costs(manifold: Manifold, times: Array, nodes: list[Array]) -> Edges:
-    """Of every pair of neighbours 1/2 d'G d/dt, G the mean of both ends' metrics; infinite above the velocity limits."""
+def edge_costs(manifold: Manifold, times: Array, nodes: list[Array], velocity: Array) -> Edges:
+    """Of every pair of neighbours 1/2 d'G d/dt, G the mean of both ends' metrics; infinite above the limits `velocity` (n,)."""
     roots = [np.linalg.cholesky(manifold.metric(layer)) for layer in nodes]
-    velocity, n, edges = manifold.problem.bounds.velocity, manifold.n, []
+    n, edges = manifold.n, []
     for i, dt in enumerate(np.diff(times)):
         d = manifold.wrap(nodes[i + 1][None] - nodes[i][:, None]).transpose(2, 0, 1).astype(np.float32)
         cost = np.zeros(d.shape[1:], np.float32)

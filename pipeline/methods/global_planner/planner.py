@@ -39,7 +39,7 @@ STARTS = {
 TRACKING = 1e-8  # [m] what an optimum must keep at every knot
 
 
-ELASTIC_STARTS = 3  # from how many motions the least violation is sought when no motion is feasible
+ELASTIC_STARTS = 3  # from how many motions IPOPT seeks a motion, and the least violation, when Newton found none
 
 
 FEWER = 12  # starts on a finer grid after none succeeded on the coarse one
@@ -168,6 +168,9 @@ def _optimise_starts(
     if batch is None:
         return context.workers.map(optimise_start, (problem, grid, options), list(motions), done)
     firsts = batch.coarse(grid, motions)
+    if not any(first.converged for first in firsts):
+        # IPOPT's restoration leaves motions that break limits for others farther away.
+        return _optimise_starts(problem, grid, options, motions[:ELASTIC_STARTS], None, context)
     if batch.first is problem:
         for count, first in enumerate(firsts, 1):
             done(count, first)
