@@ -45,15 +45,19 @@ ELASTIC_STARTS = 3  # from how many motions IPOPT seeks a motion, and the least 
 FEWER = 12  # starts on a finer grid after none succeeded on the coarse one
 
 
+FEW_STEPS = 12  # intervals of the coarsest grid of a base that moves: its starts are a population, whose size grows with it
+
+
 HOPELESS = 0.1  # relative violation on a coarse grid from which on finer ones are not tried
 
 
 def solve(problem: Problem, options: GlobalOptions, context: Context) -> list[Solution]:
     """All distinct optima found, best first."""
-    grids = refinement(problem.times, options.coarse_steps)
+    moves = problem.task.arm.base_coordinates > 0
+    grids = refinement(problem.times, min(options.coarse_steps, FEW_STEPS) if moves else options.coarse_steps)
     motions, log = _starts(problem, grids[0], options, np.random.default_rng(context.seed))
     if not len(motions):
-        message = "no candidate could follow the path from its start to its end: it leaves the reach of the arm"
+        message = "none of the motions that were drawn follows the path to its end; it may leave the reach of the arm"
         return [_nothing(problem, Status.INFEASIBLE, message, log)]
 
     why = Batch.without(problem, options)
