@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help run reproduce test fast lint format cover bench package docs pictures clean
+.PHONY: help run reproduce test fast lint format cover bench package docs pictures clean schema
 
 help: ## this list
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
@@ -33,6 +33,9 @@ format: $(VENV)/.installed-dev ## put the code into its form, and mend what the 
 
 cover: $(VENV)/.installed-dev ## which lines the tests do not reach
 	$(BIN)/python -m pytest --numprocesses 2 --dist worksteal --cov pipeline --cov-report term-missing:skip-covered
+
+schema: $(VENV)/.installed ## write conf/schema.json, by which editors check the files of conf/
+	$(BIN)/python -m pipeline.config
 
 bench: $(VENV)/.installed-dev ## time the solver side by side with CasADi (never part of the tests)
 	$(BIN)/python -m tests.benchmarks

@@ -18,7 +18,8 @@ for _variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 
 _PUBLIC = {
     "Arm": "pipeline.model.arm",
-    "FloatingArm": "pipeline.model.base",
+    "Floating": "pipeline.model.floating",
+    "Mounting": "pipeline.robot.mounting",
     "Spacecraft": "pipeline.robot.spacecraft",
     "PositionTask": "pipeline.model.task",
     "PoseTask": "pipeline.model.task",

@@ -130,10 +130,7 @@ def peer(planar_file: Path) -> SimpleNamespace:
 @pytest.fixture(scope="session")
 def reproduced(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Every run that a printed number is found in, with fewer starts and without pictures: the folder above `runs`."""
-    from pipeline.artifacts.figures import candidates as study_figure
-    from pipeline.artifacts.figures import identification as identification_figure
-    from pipeline.artifacts.figures import motions as figures
-    from pipeline.artifacts.recording import recording
+    from tests.reports import leave_out_pictures
 
     folder = tmp_path_factory.mktemp("reproduced")
     few = ("method.global.candidates=300", "method.global.optimised=16", "candidate_study.repeats=4")
@@ -141,8 +138,7 @@ def reproduced(tmp_path_factory: pytest.TempPathFactory) -> Path:
         patch.setenv("HYDRA_FULL_ERROR", "0")  # the command line sets it; this puts it back
         patch.setattr(session, "exit_code", 0)
         patch.setattr(sys, "argv", ["reproduce"])
-        for module in (figures, identification_figure, recording, study_figure):
-            patch.setattr(module, "write", lambda *_, **__: None)
+        leave_out_pictures(patch)
         for names, words in (
             (("pmke", "global"), (*few, "identification.documents=[global]")),
             (("pontryagin",), ("methods=[pontryagin_as_printed]",)),

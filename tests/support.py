@@ -1,14 +1,16 @@
-"""What many tests need: arms, problems and configurations by name, and central differences."""
+"""What many tests need: arms, problems and configurations by name, central differences, and solids with their distances."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from hydra import compose, initialize_config_dir
+from scipy.spatial.transform import Rotation
 
 from pipeline.build.problem import prepare
 from pipeline.build.robot import load
@@ -17,6 +19,7 @@ from pipeline.config import run as config
 from pipeline.config.compose import checked
 from pipeline.model.arm import Arm
 from pipeline.problem.problem import Problem
+from pipeline.robot.shapes import Shape, capsule
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -60,12 +63,85 @@ ROBOTS = ("planar3r", "planar4r", "panda", "xarm7")
 def robot(name: str, **mounting: Any) -> Arm:
     """The arm of `robot=<name>`, with gravity and rotor inertia where it is asked for."""
     arm = load(composed(f"robot={name}").robot)
-    for key, value in mounting.items():
-        setattr(arm, key, np.asarray(value, dtype=float))
-    return arm
+    return Arm(arm.description, replace(arm.mounting, **mounting))
 
 
 def within_limits(arm: Arm, count: int, rng: np.random.Generator) -> Array:
     """Random configurations (count, n) inside the joint limits."""
     low = np.maximum(arm.description.lower, -np.pi)
     return rng.uniform(low, np.minimum(arm.description.upper, np.pi), size=(count, arm.n))
+
+
+# --- solids ---------------------------------------------------------------------------------------------------------------
+
+BALL = Shape("ball", "sphere", (0.06,), (0.25, 0.2, 0.3))
+ROD = capsule("rod", np.array([-0.4, 0.3, 0.1]), np.array([-0.2, 0.5, 0.7]), 0.04)
+BOX = Shape("box", "box", (0.2, 0.1, 0.3), (0.1, -0.4, 0.4), (0.3, 0.2, -0.5))
+
+
+def with_shapes(name: str) -> Arm:
+    """planar3r has no shapes of its own: capsules along its links."""
+    arm = robot(name)
+    if arm.description.collision:
+        return arm
+    rods = [
+        capsule(f"r{i}", np.zeros(3), np.array([length, 0, 0]), 0.02, f"link{i}")
+        for i, length in ((1, 0.25), (2, 0.25), (3, 0.3))
+    ]
+    links = [link for link in arm.description.links if link != arm.description.base]
+    rods = [replace(rod, frame=link) for rod, link in zip(rods, links, strict=False)]
+    return Arm(replace(arm.description, collision=tuple(rods)))
+
+
+def _ends(shape: Shape, position: Array, rotation: Array) -> Array:
+    """The segment (2, 3) that a sphere or capsule surrounds, in the world."""
+    half = np.array([0, 0, (shape.size[1] if shape.kind == "capsule" else 0.0) / 2])
+    inner = Rotation.from_rotvec(shape.rotation)
+    own = [np.array(shape.position) + inner.apply(sign * half) for sign in (-1, 1)]
+    return np.array([position + rotation @ point for point in own])
+
+
+def _between_segments(a: Array, b: Array) -> Array:
+    """Distances (P,) of segments (P, 2, 3) by brute force, refined: no closed form to get wrong."""
+    s = t = np.full(len(a), 0.5)
+    width, pairs = 0.5, np.arange(len(a))
+    for _ in range(40):
+        grid = np.linspace(-width, width, 9)
+        u, v = (np.clip(middle[:, None] + grid, 0, 1) for middle in (s, t))
+        first, second = (
+            segment[:, :1] + at[:, :, None] * (segment[:, 1:] - segment[:, :1]) for segment, at in ((a, u), (b, v))
+        )
+        distance = np.linalg.norm(first[:, :, None] - second[:, None], axis=3)
+        i, j = np.divmod(distance.reshape(len(a), -1).argmin(axis=1), len(grid))
+        s, t, width = u[pairs, i], v[pairs, j], width * 0.6
+    return distance.min(axis=(1, 2))
+
+
+def segment_distances(arm: Arm, others: tuple[Shape, ...], q: Array) -> Array:
+    """The smallest distance (K,) [m] of the arm's moving spheres and capsules from `others` at q (K, n), without Drake's
+    geometry: between segments, less the radii.
+    """
+    distances = []
+    for shape in arm.description.collision:
+        if shape.frame is None or shape.frame not in _moving_links(arm):
+            continue
+        frame = _moving_links(arm)[shape.frame]
+        mine = np.array([_ends(shape, *pose) for pose in zip(*frame.pose(q[:, : frame.n]), strict=True)])
+        for other in others:
+            theirs = np.tile(_ends(other, np.zeros(3), np.eye(3)), (len(q), 1, 1))
+            distances.append(_between_segments(mine, theirs) - shape.size[0] - other.size[0])
+    return np.min(distances, axis=0)
+
+
+@cache
+def _moving_links(arm: Arm) -> dict[str, Arm]:
+    """The arm up to each link whose place depends on the chain's joints alone, with at least one of them."""
+    found = {}
+    for link in {str(shape.frame) for shape in arm.description.collision} - {arm.description.base}:
+        try:
+            part = Arm.from_urdf(arm.description.file, link)
+        except ValueError:
+            continue
+        if part.description.joints == arm.description.joints[: part.n]:
+            found[link] = part
+    return found

@@ -18,7 +18,7 @@ from pipeline.methods.lsv import inertia_weighted, lsv
 from pipeline.methods.method import Context
 from pipeline.methods.pmke.predictive import pmke
 from pipeline.model.arm import Arm
-from pipeline.model.clearance import Obstacles
+from pipeline.model.obstacles import Obstacles
 from pipeline.model.task import PoseTask, PositionTask
 from pipeline.path.curves import Line
 from pipeline.path.orientation import Orientation
@@ -26,22 +26,22 @@ from pipeline.path.reference import Reference
 from pipeline.path.timing import RaisedCosine
 from pipeline.problem.costs import objective_values
 from pipeline.problem.limits import Limits
-from pipeline.problem.objective import IntegralBounds, Objective
+from pipeline.problem.objective import Objective
 from pipeline.problem.problem import Boundary, Problem
 from pipeline.problem.solution import Status
-from pipeline.program.program import Transcription
+from pipeline.program.transcription import transcribe
+from pipeline.robot.mounting import Mounting
 from pipeline.search.population import population
 from pipeline.search.selection import diverse
 from tests.benchmarks.peer import PlanarArm, kinetic_energy_program, solve
-from tests.model.test_clearance import BALL, with_shapes
 from tests.program.test_program import program_jacobian, program_value
-from tests.support import ROBOTS, composed, robot, within_limits
+from tests.support import BALL, ROBOTS, composed, robot, with_shapes, within_limits
 
 
 def everything(name: str, rng: np.random.Generator) -> Problem:
     """100 knots, gravity, rotor inertia, every kind of limit, an obstacle, both integrals bounded."""
     base = with_shapes(name)
-    arm = Arm(base.description, gravity=(1.0, -2.0, -9.8), armature=0.01, payload=0.3)
+    arm = Arm(base.description, Mounting(gravity=(1.0, -2.0, -9.8), armature=0.01, payload=0.3))
     task = PoseTask(arm) if arm.n > 6 else PositionTask(arm)
     q = within_limits(arm, 1, rng)[0]
     start = task.value(q[None])[0]
@@ -58,10 +58,10 @@ def everything(name: str, rng: np.random.Generator) -> Problem:
         Reference(line, RaisedCosine(2.0), turning),
         q,
         np.linspace(0.0, 2.0, 100),
-        objective=Objective(0.5, 0.5),
+        objective=Objective({"kinetic_energy": 0.5, "torque": 0.5}),
         limits=Limits(-3 * ones, 3 * ones, ones, 50 * ones, 20 * ones),
         boundary=Boundary.FREE,
-        integral_bounds=IntegralBounds(1.0, 1e3),
+        bounds_of_integrals={"kinetic_energy": 1.0, "torque": 1e3},
         obstacles=Obstacles((BALL,), 0.03, 0.2),
     )
 
@@ -70,8 +70,8 @@ def everything(name: str, rng: np.random.Generator) -> Problem:
 def test_every_row_of_the_program_at_100_random_configurations(name: str, rng: np.random.Generator) -> None:
     """Along random directions, all constraints at once: their Jacobian against central differences."""
     problem = everything(name, rng)
-    made = Transcription(problem, problem.times, within_limits(problem.task.arm, 100, rng))
-    x = 0.3 * rng.normal(size=made.program.num_vars())
+    made = transcribe(problem, problem.times, within_limits(problem.task.arm, 100, rng))
+    x = 0.3 * rng.normal(size=made.drake.num_vars())
     x[: made.y.size] = 0.03 * within_limits(problem.task.arm, 100, rng).ravel()
     jacobian = program_jacobian(made, x)
     for _ in range(4):
@@ -88,7 +88,7 @@ def test_every_row_of_the_program_at_100_random_configurations(name: str, rng: n
 
 @pytest.mark.parametrize("name", ROBOTS)
 def test_dynamics_with_gravity_payload_and_rotors(name: str, rng: np.random.Generator) -> None:
-    arm = Arm(robot(name).description, gravity=(0.5, 1.0, -9.8), armature=0.02, payload=0.7)
+    arm = Arm(robot(name).description, Mounting(gravity=(0.5, 1.0, -9.8), armature=0.02, payload=0.7))
     q = within_limits(arm, 100, rng)
     qd, qdd = rng.normal(size=(2, 100, arm.n))
     tau, *gradients = arm.inverse_dynamics_gradient(q, qd, qdd)
@@ -111,8 +111,9 @@ def test_dynamics_with_gravity_payload_and_rotors(name: str, rng: np.random.Gene
 
 def test_gravity_torque_is_the_slope_of_the_potential(rng: np.random.Generator) -> None:
     """A payload on an arm adds m g' dx/dq: the difference of two arms that differ in it alone."""
-    description, g = robot("panda").description, np.array([0.3, -0.2, -9.8])
-    light, heavy = Arm(description, gravity=g), Arm(description, (0.1, 0.0, 0.2), gravity=g, payload=2.0)
+    description, g = robot("panda").description, (0.3, -0.2, -9.8)
+    light = Arm(description, Mounting(gravity=g))
+    heavy = Arm(description, Mounting((0.1, 0.0, 0.2), gravity=g, payload=2.0))
     q = within_limits(light, 10, rng)
     added = 2.0 * np.einsum("i,kij->kj", g, heavy.jacobian(q))
     np.testing.assert_allclose(heavy.gravity_torque(q) - light.gravity_torque(q), added, atol=1e-10)
@@ -121,7 +122,8 @@ def test_gravity_torque_is_the_slope_of_the_potential(rng: np.random.Generator) 
 def test_a_placed_base_moves_the_whole_arm(rng: np.random.Generator) -> None:
     for name in ("panda", "xarm7"):  # the xArm's root is called `world`
         plain = robot(name)
-        placed = Arm(plain.description, base_position=(1, 2, 3), base_rpy=(0.3, -0.4, 0.5), armature=plain.armature)
+        standing = replace(plain.mounting, base_position=(1.0, 2.0, 3.0), base_rpy=(0.3, -0.4, 0.5))
+        placed = Arm(plain.description, standing)
         q = within_limits(plain, 5, rng)
         turn = Rotation.from_euler("xyz", (0.3, -0.4, 0.5))
         shift = np.array([1.0, 2.0, 3.0])

@@ -3,29 +3,25 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pandas as pd
 
-from pipeline.config.run import RunConfig
+from pipeline.artifacts.report import Report
+from pipeline.common.markdown import markdown_table
+from pipeline.config.documents import Printed
 from pipeline.evaluation.evaluation import Evaluation
-from pipeline.problem.problem import Problem
-from pipeline.studies import certificate, export
-from pipeline.studies.front import hypervolume
-from pipeline.studies.studies import Extras
+from pipeline.problem.integrals import INTEGRALS
 
 UNITS = {
-    "kinetic_energy_integral": "J s",
+    **{f"{name}_integral": integral.unit for name, integral in INTEGRALS.items()},
     "kinetic_energy_integral_spline": "J s",
-    "torque_integral": "N² m² s",
     "max_tracking_error": "m",
     "max_tracking_error_between": "m",
     "final_error": "m",
     "max_orientation_error": "rad",
     "max_orientation_error_between": "rad",
-    "velocity_norm_integral": "rad²/s",
     "peak_velocity": "rad/s",
     "peak_torque": "N m",
     "peak_power": "W",
@@ -33,86 +29,55 @@ UNITS = {
     "min_spectral_radius_time": "s",
     "singular_time": "s",
     "min_clearance": "m",
-    "export_tracking_error": "m",
-    "closed_loop_joint_error": "rad",
-    "closed_loop_tracking_error": "m",
     "min_clearance_between": "m",
     "peak_reaction_force": "N",
     "peak_reaction_torque": "N m",
-    "reaction_force_integral": "N² s",
-    "reaction_torque_integral": "N² m² s",
     "max_base_turn": "rad",
     "final_base_turn": "rad",
     "final_base_shift": "m",
-    "base_rotation_integral": "rad²/s",
     "max_floating_path_error": "m",
     "wall_time_s": "s",
 }
 
 
-def markdown(
-    config: RunConfig, problem: Problem, evaluations: Sequence[Evaluation], table: pd.DataFrame, extras: Extras
-) -> str:
-    """The summary for people: a row per quantity and a column per motion, published values and differences beside."""
-    reference = problem.reference
-    arm = problem.task.arm.description
+def markdown(report: Report, table: pd.DataFrame, published: Printed) -> str:
+    """The summary for people: a row per quantity and a column per motion, published values and differences beside.
+
+    table: summary.csv.
+    """
+    motions, config = report.motions, report.motions.config
+    reference, arm = motions.problem.reference, motions.problem.task.arm.description
+    units = dict(UNITS)
+    for result in report.results:
+        units |= result.units
     lines = [
         f"# {config.name}",
         "",
-        f"{arm.name} ({len(arm.actuated)} joints, r = {problem.task.redundancy}), path of {reference.geometry.length:.4g} m "
-        f"in {reference.duration:g} s, {len(problem.times) - 1} intervals, objective {config.objective.kind}, "
-        f"limits {config.limits.kind}, boundary {config.boundary.kind}, base {config.base.kind}, seed {config.seed}.",
+        f"{arm.name} ({len(arm.actuated)} joints, r = {motions.problem.task.redundancy}), "
+        f"path of {reference.geometry.length:.4g} m in {reference.duration:g} s, "
+        f"{len(motions.problem.times) - 1} intervals, objective {config.objective.kind}, limits {config.limits.kind}, "
+        f"boundary {config.boundary.kind}, base {config.base.kind}, seed {config.seed}.",
         "",
-        *markdown_table(_by_quantity(evaluations, table)),
+        *markdown_table(_by_quantity(motions.evaluations, table, units)),
         "",
     ]
-    lines += [f"- **{e.label}**: {e.message or e.status.value}" for e in evaluations]
-    if extras.certificate is not None:
-        grid = next(e for e in evaluations if e.method == "dynamic_programming")
-        lines += ["", f"Certificate: {certificate.sentence(extras.certificate, len(grid.time) - 1)}."]
-    if extras.validation is not None:
-        lines += ["", "## Planner and calculus of variations", "", *markdown_table(_cells(extras.validation))]
-    if extras.front is not None:
-        good = extras.front[extras.front["status"] == "optimal"]
-        share = hypervolume(good[extras.front.columns[2:4]].to_numpy())
-        lines += ["", "## Pareto front", "", f"Hypervolume {share:.4f} of the rectangle between the extremes.", ""]
-        lines += markdown_table(_cells(extras.front.drop(columns=["solver_status"])))
-    if extras.convergence is not None:
-        lines += ["", "## Planner on finer grids, against the extremal of the maximum principle", ""]
-        lines += markdown_table(_cells(extras.convergence))
-    if extras.identification is not None:
-        found = extras.identification
-        lines += ["", f"## Masses [kg], with intervals of {found.confidence:.0%} confidence", ""]
-        lines += markdown_table(_cells(found.masses))
-        lines += ["", "## What the printed and the identified masses give (residuals in units of the rounding)", ""]
-        lines += markdown_table(_cells(found.numbers))
-    if extras.exported is not None:
-        lines += ["", f"Exported: {export.sentence(extras.exported)}."]
-    elif config.export.method == "best":
-        lines += [
-            "",
-            "Exported: nothing, since no confirmed motion keeps every limit (export.method names one anyway).",
-        ]
-    if extras.closed_loop is not None:
-        lines += ["", f"Closed loop: {extras.closed_loop.sentence}."]
-    if extras.study is not None:
-        study = extras.study
-        lines += [
-            "",
-            f"Candidates: distance = exp({study.intercept:.4f}) N^{study.exponent:.4f} from N = {study.parameters} on; the paper prints exp(-4.0733) N^-0.2030.",
-        ]
-    if config.published.document:
-        lines += ["", f"Printed values: {config.published.document}. {config.published.note}".rstrip()]
+    lines += [f"- **{e.label}**: {e.message or e.status.value}" for e in motions.evaluations]
+    for result in report.results:
+        if section := result.section():
+            lines += ["", *section]
+    if published.document:
+        lines += ["", f"Printed values: {published.document}. {published.note}".rstrip()]
     lines += [
         "",
-        "Integrals are backward-difference sums on each motion's own grid, as in the documents; *spline* is the continuous "
-        "integral of the cubic spline through the knots, free of that quadrature. All values are recomputed from q(t).",
+        "Integrals are backward-difference sums on each motion's own grid, as in the documents; *spline* is the "
+        "continuous integral of the cubic spline through the knots, free of that quadrature. All values are recomputed "
+        "from q(t).",
         "",
     ]
     return "\n".join(lines)
 
 
-def _by_quantity(evaluations: Sequence[Evaluation], table: pd.DataFrame) -> list[list[str]]:
+def _by_quantity(evaluations: Sequence[Evaluation], table: pd.DataFrame, units: Mapping[str, str]) -> list[list[str]]:
     rows = [["", *(e.label for e in evaluations)]]
     skipped = ("method", "optimum", "message")
     for column in table.columns:
@@ -122,7 +87,7 @@ def _by_quantity(evaluations: Sequence[Evaluation], table: pd.DataFrame) -> list
             or table[column].isin(["", np.nan]).all()
         ):
             continue
-        unit = UNITS.get(column, UNITS.get(re.sub(r"_\d+$", "", column), ""))
+        unit = units.get(column, units.get(re.sub(r"_\d+$", "", column), ""))
         cells = []
         for row in table.to_dict("records"):
             printed = row.get(f"published_{column}", np.nan)
@@ -132,23 +97,3 @@ def _by_quantity(evaluations: Sequence[Evaluation], table: pd.DataFrame) -> list
             cells.append(text)
         rows.append([column.removesuffix("_s").replace("_", " ") + (f" [{unit}]" if unit else ""), *cells])
     return rows
-
-
-def markdown_table(rows: list[list[str]]) -> list[str]:
-    head, *body = ["| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |" for row in rows]
-    return [head, "|---|" + "---:|" * (len(rows[0]) - 1), *body]
-
-
-def _cells(table: pd.DataFrame) -> list[list[str]]:
-    rows = [[column.replace("_", " ") for column in table.columns]]
-    for record in table.to_numpy():
-        rows.append([_cell(value) for value in record])
-    return rows
-
-
-def _cell(value: Any) -> str:
-    if isinstance(value, bool):
-        return "yes" if value else ""
-    if isinstance(value, str):
-        return value
-    return "" if pd.isna(value) or np.isinf(value) else f"{value:.5g}"

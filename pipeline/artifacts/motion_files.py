@@ -10,6 +10,7 @@ from typing import Any
 import pandas as pd
 import yaml
 
+from pipeline.artifacts.report import Report
 from pipeline.common.files import write_beside
 from pipeline.studies.export import Resampled
 
@@ -40,8 +41,15 @@ def joint_trajectory(motion: Resampled, joints: Sequence[str], frame: str) -> di
     return {"header": header, "joint_names": list(joints), "points": points}
 
 
-def write(folder: Path, motion: Resampled, joints: Sequence[str], frame: str) -> None:
-    """motion.csv, motion.json and motion.yaml in `folder`."""
+def write(report: Report, folder: Path) -> None:
+    """motion.csv, motion.json and motion.yaml in `folder`, where there is a motion to export."""
+    arm, motion = report.motions.problem.task.arm.description, report.find(Resampled)
+    if motion is not None:
+        save(folder, motion, arm.actuated, arm.base)
+
+
+def save(folder: Path, motion: Resampled, joints: Sequence[str], frame: str) -> None:
+    """The three files of one motion, of an arm with these joints on the link `frame`."""
     message = joint_trajectory(motion, joints, frame)
     rows = table(motion, joints)
     write_beside(folder / "motion.csv", lambda file: rows.to_csv(file, index=False))

@@ -8,16 +8,16 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from pipeline.common.arrays import Array
-from pipeline.evaluation.base import Base
-from pipeline.model.base import FloatingArm
+from pipeline.evaluation.base import BaseMotion
+from pipeline.model.arm import Arm
 from pipeline.robot.shapes import Shape
 
 SMALLEST, THIN = 0.04, 0.1  # [m] of an edge; of the height of a planar arm's base, relative
 
 
-def box(arm: FloatingArm) -> Shape:
+def box(arm: Arm) -> Shape:
     """That box in the frame of the root link; without a spacecraft, of the root link itself."""
-    craft = arm.spacecraft
+    craft = arm.base.spacecraft
     mass, com, inertia = craft.mass, craft.com, np.array(craft.inertia)
     if mass == 0:
         mass, com, inertia = _root_inertia(arm)
@@ -26,7 +26,7 @@ def box(arm: FloatingArm) -> Shape:
     axes = axes * np.sign(np.linalg.det(axes))
     if np.allclose(moments, moments[0]):
         axes = np.eye(3)
-    if arm.planar:
+    if arm.base.count == 3:
         # Only the moment about z is known to matter: a square plate of that moment.
         side = max(float(np.sqrt(6 * inertia[2, 2] / mass)), SMALLEST)
         edges, axes = np.array([side, side, THIN * side]), np.eye(3)
@@ -34,7 +34,7 @@ def box(arm: FloatingArm) -> Shape:
     return Shape("spacecraft", "box", tuple(edges.tolist()), tuple(map(float, com)), tuple(map(float, turn)))
 
 
-def _root_inertia(arm: FloatingArm) -> tuple[float, tuple[float, ...], Array]:
+def _root_inertia(arm: Arm) -> tuple[float, tuple[float, ...], Array]:
     inertial = ET.fromstring(arm.description.xml).find(f"link[@name='{arm.description.base}']/inertial")
     if inertial is None:
         return 1.0, (0.0, 0.0, 0.0), np.zeros((3, 3))
@@ -47,18 +47,18 @@ def _root_inertia(arm: FloatingArm) -> tuple[float, tuple[float, ...], Array]:
     return (float(mass.get("value", "0")) if mass is not None else 0.0) or 1.0, com, full
 
 
-def outlines(arm: FloatingArm, base: Base) -> Array:
+def outlines(arm: Arm, base: BaseMotion) -> Array:
     """The face on which the arm stands, closed: (N + 1, 5, 3) [m] in the world; of a planar arm's plate the middle."""
-    level = 0.0 if arm.planar else 1.0 if box(arm).position[2] <= 0 else -1.0
+    level = 0.0 if arm.base.count == 3 else 1.0 if box(arm).position[2] <= 0 else -1.0
     return _moved(arm, base, np.array([[x, y, level] for x, y in ((1, 1), (-1, 1), (-1, -1), (1, -1), (1, 1))]))
 
 
-def corners(arm: FloatingArm, base: Base) -> Array:
+def corners(arm: Arm, base: BaseMotion) -> Array:
     """The box's corners (N + 1, 8, 3) [m] in the world."""
     return _moved(arm, base, np.stack(np.meshgrid(*[(-1, 1)] * 3), axis=-1).reshape(-1, 3))
 
 
-def _moved(arm: FloatingArm, base: Base, points: Array) -> Array:
+def _moved(arm: Arm, base: BaseMotion, points: Array) -> Array:
     """Points (P, 3) in half edges from the box's middle, in the world (N + 1, P, 3)."""
     shape = box(arm)
     own = Rotation.from_rotvec(shape.rotation).apply(points * np.array(shape.size) / 2) + np.array(shape.position)

@@ -1,49 +1,89 @@
-"""The tables of a run: summary.csv, summary.md, trajectories.parquet, run.json."""
+"""The tables of a run: summary.csv and summary.md, trajectories.parquet, and those that its studies have."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
+from scipy.spatial.transform import Rotation
 
-from pipeline.artifacts.record import trajectories
+from pipeline.artifacts.markdown import markdown
+from pipeline.artifacts.report import Report
 from pipeline.common.files import write_beside
-from pipeline.config.studies import PublishedConfig
+from pipeline.config.documents import printed_for
 from pipeline.evaluation.evaluation import Evaluation
 from pipeline.model.task import PositionTask
+from pipeline.problem.integrals import INTEGRALS
 from pipeline.problem.problem import Problem
-from pipeline.studies.studies import NOTHING, Extras
 
 
-def summary(
-    problem: Problem,
-    evaluations: Sequence[Evaluation],
-    wall_times: Mapping[str, float],
-    published: PublishedConfig,
-    extras: Extras = NOTHING,
-) -> pd.DataFrame:
+def write(report: Report, folder: Path) -> None:
+    """All of them into `folder`."""
+    motions = report.motions.evaluations
+    for result in report.results:
+        for name, table in result.tables().items():
+            write_beside(folder / f"{name}.csv", partial(table.to_csv, index=False))
+    write_beside(folder / "summary.csv", partial(summary(report).to_csv, index=False))
+    write_beside(folder / "summary.md", lambda file: file.write_text(text(report), encoding="utf-8"))
+    write_beside(folder / "trajectories.parquet", partial(trajectories(motions).to_parquet, index=False))
+
+
+def text(report: Report) -> str:
+    """summary.md: the summary for people."""
+    return markdown(report, summary(report), printed_for(report.motions.config.name))
+
+
+def summary(report: Report) -> pd.DataFrame:
     """One row per motion; `published_*` and `difference_*` (relative) columns where a document prints the number."""
-    rows = []
-    for evaluation in evaluations:
-        row = _row(problem, evaluation) | _sent(evaluation, extras)
-        row["wall_time_s"] = wall_times[evaluation.method]
-        if evaluation.solution.optimum == 1:
-            for column, printed in published.values.get(evaluation.method, {}).items():
-                row[f"published_{column}"] = printed
-                row[f"difference_{column}"] = row[column] / printed - 1 if column in row else np.nan
-            if evaluation is evaluations[0] and published.note:
-                row["published_note"] = published.note
+    motions, printed = report.motions, printed_for(report.motions.config.name)
+    rows: list[dict[str, Any]] = []
+    for e in motions.evaluations:
+        row = _row(motions.problem, e)
+        for result in report.results:
+            row |= result.columns(e)
+        row["wall_time_s"] = report.seconds[e.method]
+        if e.solution.optimum == 1:
+            row |= _differences(row, printed.values.get(e.method, {}))
+        if printed.note and not rows:
+            row["published_note"] = printed.note
         rows.append(row)
     return pd.DataFrame(rows)
 
 
+def _differences(row: Mapping[str, Any], printed: Mapping[str, float]) -> dict[str, float]:
+    beside = {}
+    for column, value in printed.items():
+        beside[f"published_{column}"] = value
+        beside[f"difference_{column}"] = row[column] / value - 1 if column in row else np.nan
+    return beside
+
+
+def trajectories(evaluations: Sequence[Evaluation]) -> pd.DataFrame:
+    """The long table: method, optimum, time, q_1..n, qd_1..n, qdd_1..n, tau_1..n, x, y, z; of a floating base its
+    position base_x, .. and rotation vector base_rx, .. in the world.
+    """
+    parts = []
+    for e in evaluations:
+        columns: dict[str, Any] = {"method": e.method, "optimum": e.solution.optimum, "time": e.time}
+        for name, values in (("q", e.q), ("qd", e.qd), ("qdd", e.qdd), ("tau", e.tau)):
+            columns |= {f"{name}_{j + 1}": values[:, j] for j in range(values.shape[1])}
+        columns |= dict(zip("xyz", e.position.T, strict=True))
+        if e.base.reaction is None:
+            turned = Rotation.from_matrix(e.base.rotation).as_rotvec()
+            columns |= {f"base_{axis}": column for axis, column in zip("xyz", e.base.position.T, strict=True)}
+            columns |= {f"base_r{axis}": column for axis, column in zip("xyz", turned.T, strict=True)}
+        parts.append(pd.DataFrame(columns))
+    return pd.concat(parts, ignore_index=True)
+
+
 def _first_order(problem: Problem, e: Evaluation) -> dict[str, Any]:
     """What an objective beyond kinetic energy and torque adds: the whole of it, and its parts."""
-    weights = problem.objective
-    if not weights.velocity_norm and weights.secondary is None:
+    objective = problem.objective
+    if not objective.weight("velocity_norm") and objective.secondary is None:
         return {}
     return {
         "objective": e.objective,
@@ -54,22 +94,6 @@ def _first_order(problem: Problem, e: Evaluation) -> dict[str, Any]:
         "transversality_start": e.solution.statistics.get("transversality_start", np.nan),
         "transversality_end": e.solution.statistics.get("transversality_end", np.nan),
     }
-
-
-def _sent(e: Evaluation, extras: Extras) -> dict[str, Any]:
-    """What became of the motion that is exported and simulated; others have none of these columns' values."""
-    row: dict[str, Any] = {}
-    motion, loop = extras.exported, extras.closed_loop
-    if motion is not None and (motion.method, motion.optimum) == (e.method, e.solution.optimum):
-        row["export_tracking_error"] = motion.tracking_error
-        row |= {f"export_{kind}_limit_excess": excess for kind, excess in motion.limit_excess.items()}
-    if loop is not None and (loop.method, loop.optimum) == (e.method, e.solution.optimum):
-        row |= {
-            "closed_loop_joint_error": np.abs(loop.joint_error).max(),
-            "closed_loop_tracking_error": loop.end_effector_error.max(),
-            "closed_loop_saturation": loop.saturation,
-        }
-    return row
 
 
 def _updates(e: Evaluation) -> dict[str, Any]:
@@ -103,7 +127,8 @@ def _base(problem: Problem, e: Evaluation) -> dict[str, Any]:
     if base.reaction is not None:
         peaks = [float(np.linalg.norm(base.reaction[:, part], axis=1).max()) for part in (slice(3), slice(3, 6))]
         row = dict(zip(("peak_reaction_force", "peak_reaction_torque"), peaks, strict=True))
-        names = ("reaction_force", "reaction_torque") if problem.task.arm.base_coordinates else ()
+        of_held = [name for name, integral in INTEGRALS.items() if integral.base == "held"]
+        names = of_held if problem.task.arm.base.count else []
         return row | {f"{name}_integral": e.integral(name) for name in names}
     floating = base.floating
     return {
@@ -156,26 +181,3 @@ def _row(problem: Problem, e: Evaluation) -> dict[str, Any]:
 def _without_numbers(row: dict[str, Any]) -> dict[str, Any]:
     """The row of a method that found no motion: an arm that stands still costs nothing, and that is no result."""
     return {key: np.nan if isinstance(value, float) else value for key, value in row.items()}
-
-
-def write(folder: Path, evaluations: Sequence[Evaluation], table: pd.DataFrame, text: str, extras: Extras) -> None:
-    """summary.csv, summary.md, trajectories.parquet, and the tables of what only some runs have."""
-    if extras.validation is not None:
-        validation = extras.validation
-        write_beside(folder / "validation.csv", lambda file: validation.to_csv(file, index=False))
-    if extras.convergence is not None:
-        convergence = extras.convergence
-        write_beside(folder / "convergence.csv", lambda file: convergence.to_csv(file, index=False))
-    if extras.front is not None:
-        front = extras.front
-        write_beside(folder / "front.csv", lambda file: front.to_csv(file, index=False))
-    if extras.study is not None:
-        curve = pd.DataFrame({"candidates": extras.study.count, "distance": extras.study.distance})
-        write_beside(folder / "candidate_study.csv", lambda file: curve.to_csv(file, index=False))
-    if extras.identification is not None:
-        found = extras.identification
-        write_beside(folder / "masses.csv", lambda file: found.masses.to_csv(file, index=False))
-        write_beside(folder / "identification.csv", lambda file: found.numbers.to_csv(file, index=False))
-    write_beside(folder / "summary.csv", lambda file: table.to_csv(file, index=False))
-    write_beside(folder / "summary.md", lambda file: file.write_text(text, encoding="utf-8"))
-    write_beside(folder / "trajectories.parquet", lambda file: trajectories(evaluations).to_parquet(file, index=False))

@@ -12,8 +12,8 @@ import numpy as np
 import pandas as pd
 from omegaconf import OmegaConf
 
-from pipeline.artifacts.markdown import markdown_table
 from pipeline.common.files import write_beside
+from pipeline.common.markdown import markdown_table
 
 # Title in sweep.md, column of summary.csv, format, factor.
 NUMBERS = (

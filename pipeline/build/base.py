@@ -11,49 +11,58 @@ from pipeline.common.errors import ConfigError
 from pipeline.config.robot import FreeBaseConfig
 from pipeline.config.run import RunConfig
 from pipeline.model.arm import Arm
-from pipeline.model.base import FloatingArm, is_planar
+from pipeline.model.base import Base, Held
+from pipeline.model.coordinates import PLANE, Coordinates
+from pipeline.model.floating import Floating, pose_coordinates
+from pipeline.problem.integrals import INTEGRALS
 from pipeline.problem.limits import Limits
 from pipeline.problem.problem import Problem
 from pipeline.robot.spacecraft import Spacecraft
 from pipeline.robot.urdf import root_mass
-
-REACTIONS = {"reaction_force", "reaction_torque"}
 
 
 def place(problem: Problem, config: RunConfig) -> Problem:
     """The problem on the base that `config` asks for; raises ConfigError if they do not go together."""
     wanted = {key for key, weight in config.objective.weights.items() if weight}
     wanted |= set(config.method.pareto.objectives) if "pareto" in config.methods else set()
+    bases = {INTEGRALS[name].base for name in wanted}
     free = isinstance(config.base, FreeBaseConfig)
-    if "base_rotation" in wanted and not free:
+    if "floating" in bases and not free:
         raise ConfigError("base_rotation: the base does not move; set base=free")
-    if wanted & REACTIONS and free:
+    if "held" in bases and free:
         raise ConfigError("reaction: nothing acts on a base that floats; set base=fixed")
     if np.isfinite(problem.bounds.attitude) and not free:
         raise ConfigError(f"limits.attitude = {problem.bounds.attitude:g}: the base does not move; set base=free")
+    arm = problem.task.arm
+    base: Base
     if isinstance(config.base, FreeBaseConfig):
-        spacecraft = _spacecraft(config.base, problem.task.arm)
-    elif wanted & REACTIONS:
-        spacecraft = Spacecraft(held=True)
+        spacecraft = _spacecraft(config.base, arm)
+        base = Floating(spacecraft, _coordinates(arm, spacecraft))
+    elif "held" in bases:
+        base = Held(pose_coordinates(arm, Held.spacecraft))
     else:
         return problem
     if config.closed_loop.run:
         raise ConfigError("closed_loop.run: the controller is one for arms on a fixed base")
     if problem.objective.secondary is not None:
         raise ConfigError("objective.secondary: secondary criteria are for arms on a fixed base")
-    if np.any(problem.task.arm.gravity) and free:
+    if np.any(arm.mounting.gravity) and free:
         raise ConfigError("gravity: a floating base falls under it, and its momentum is not constant; set gravity=none")
-    return _moved(problem, spacecraft)
+    return _moved(problem, base)
 
 
-def _moved(problem: Problem, spacecraft: Spacecraft) -> Problem:
+def _coordinates(arm: Arm, spacecraft: Spacecraft) -> Coordinates:
+    found = pose_coordinates(arm, spacecraft)
+    if found is PLANE and any(spacecraft.momentum[i] for i in (2, 3, 4)):
+        raise ConfigError("base: a planar arm has linear momentum in x and y, and angular momentum about z only")
+    return found
+
+
+def _moved(problem: Problem, base: Base) -> Problem:
     """The same task, path and limits, with the base's coordinates before the joints: no limits but on its attitude."""
     fixed = problem.task.arm
-    planar = is_planar(fixed, spacecraft)
-    if planar and any(spacecraft.momentum[i] for i in (2, 3, 4)):
-        raise ConfigError("base: a planar arm has linear momentum in x and y, and angular momentum about z only")
-    arm = FloatingArm(fixed, spacecraft, planar)
-    free = np.full(arm.base_coordinates, np.inf)
+    arm = Arm(fixed.description, fixed.mounting, base)
+    free = np.full(base.count, np.inf)
 
     def padded(values: Array, sign: float = 1.0) -> Array:
         return np.concatenate([sign * free, values])
@@ -67,7 +76,7 @@ def _moved(problem: Problem, spacecraft: Spacecraft) -> Problem:
         padded(own.power),
         own.attitude,
     )
-    q_init = np.concatenate([np.zeros(arm.base_coordinates), problem.q_init])
+    q_init = np.concatenate([np.zeros(base.count), problem.q_init])
     return replace(problem, task=replace(problem.task, arm=arm), q_init=q_init, limits=limits)
 
 

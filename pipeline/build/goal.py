@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -14,7 +13,7 @@ from pipeline.config.goal import LimitsConfig, WeightedConfig
 from pipeline.config.robot import ObstaclesConfig
 from pipeline.config.run import RunConfig
 from pipeline.model.arm import Arm
-from pipeline.model.clearance import Obstacles
+from pipeline.model.obstacles import Obstacles
 from pipeline.problem.limits import Limits
 from pipeline.problem.objective import Objective
 from pipeline.problem.secondary import Secondary
@@ -29,7 +28,7 @@ def make_limits(limits: LimitsConfig, arm: Arm) -> Limits:
         given = getattr(limits, key)
         if given is None:
             return own
-        if isinstance(given, list) and len(given) != arm.n:
+        if isinstance(given, tuple) and len(given) != arm.n:
             raise ConfigError(f"limits.{key} has {len(given)} values, the arm has {arm.n} moving joints")
         return np.broadcast_to(np.asarray(given, dtype=float), arm.n).copy()
 
@@ -46,21 +45,20 @@ def make_limits(limits: LimitsConfig, arm: Arm) -> Limits:
 def make_objective(config: RunConfig, arm: Arm) -> Objective:
     """The objective; joints are centred in the ranges of the description, or those that `limits` gives."""
     own = config.objective
-    weights: dict[str, Any] = {"kinetic_energy": 0.0, **own.weights}
     if isinstance(own, WeightedConfig) and abs(sum(own.weights.values()) - 1.0) > 1e-9:
         names = " + ".join(f"objective.{name}" for name in own.weights)
         raise ConfigError(f"{names} = {sum(own.weights.values()):g}: the weights must add up to 1")
     if not any(own.weights.values()):
         raise ConfigError(f"objective = {own.kind}: all its weights are zero")
     if not own.criteria:
-        return Objective(**weights)
+        return Objective(own.weights)
     ranges = make_limits(replace(config.limits, kind="joint"), arm)
     if "joint_centering" in own.criteria and not np.isfinite(ranges.upper - ranges.lower).any():
         raise ConfigError(
             f"objective.secondary = {own.secondary}: {arm.description.name} states no joint limits to centre its joints in; "
             "give limits.lower and limits.upper"
         )
-    return Objective(**weights, secondary=Secondary(own.criteria, own.k0, ranges.lower, ranges.upper))
+    return Objective(own.weights, Secondary(own.criteria, own.k0, ranges.lower, ranges.upper))
 
 
 def make_obstacles(obstacles: ObstaclesConfig, arm: Arm) -> Obstacles | None:

@@ -48,7 +48,7 @@ def make_knots(timing: TimingConfig) -> Array:
 def make_task(robot: RobotConfig, arm: Arm) -> Task:
     if robot.orientation == "none":
         return PositionTask(arm, tuple(robot.task))
-    if robot.task != ["x", "y", "z"]:
+    if robot.task != ("x", "y", "z"):
         raise RobotError(
             f"robot.task = [{', '.join(robot.task)}]: with robot.orientation = {robot.orientation} it must be [x, y, z]"
         )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -15,32 +16,34 @@ from pipeline.config.robot import CapsuleConfig, RobotConfig, SphereConfig
 from pipeline.model.arm import Arm
 from pipeline.robot import urdf
 from pipeline.robot.description import Description
+from pipeline.robot.mounting import Mounting
 from pipeline.robot.packages import find
 from pipeline.robot.shapes import Shape, capsule
 
 GRAVITY = {"none": (0.0, 0.0, 0.0), "earth": (0.0, 0.0, -9.80665)}  # [m/s^2]
 
 
-def load(robot: RobotConfig, gravity: str | list[float] = "none") -> Arm:
+def load(robot: RobotConfig, gravity: str | Sequence[float] = "none") -> Arm:
     """The arm of a configuration; raises RobotError or ConfigError, one line."""
     description = urdf.read(find(robot.urdf), robot.end_effector, robot.base, robot.locked)
     if robot.collision is not None:
         shapes = _link_shapes(robot.collision, description)
         description = replace(description, collision=shapes)
-    if isinstance(robot.armature, list) and len(robot.armature) != len(description.joints):
+    if isinstance(robot.armature, tuple) and len(robot.armature) != len(description.joints):
         raise ConfigError(
             f"robot.armature has {len(robot.armature)} values, the arm has {len(description.joints)} moving joints"
         )
-    return Arm(
-        description,
-        robot.offset,
-        offset_rpy=robot.offset_rpy,
-        base_position=robot.base_position,
-        base_rpy=robot.base_rpy,
-        gravity=GRAVITY[gravity] if isinstance(gravity, str) else gravity,
+    armature = robot.armature
+    mounting = Mounting(
+        offset=tuple(robot.offset),
+        offset_rpy=tuple(robot.offset_rpy),
+        base_position=tuple(robot.base_position),
+        base_rpy=tuple(robot.base_rpy),
+        gravity=GRAVITY[gravity] if isinstance(gravity, str) else tuple(gravity),
         payload=robot.payload,
-        armature=robot.armature,
+        armature=tuple(armature) if isinstance(armature, list) else armature,
     )
+    return Arm(description, mounting)
 
 
 def initial(robot: RobotConfig, arm: Arm) -> Array:
@@ -65,7 +68,7 @@ def make_shape(name: str, shape: Any, frame: str | None = None) -> Shape:
     return Shape(name, "box", tuple(shape.size), center, turn, frame)
 
 
-def _link_shapes(table: dict[str, list[Any]], description: Description) -> tuple[Shape, ...]:
+def _link_shapes(table: Mapping[str, Sequence[Any]], description: Description) -> tuple[Shape, ...]:
     """The shapes that the configuration gives the links, in place of those of the description."""
     links = description.links
     for link in table:

@@ -1,199 +1,251 @@
 """The schema of `conf/reproduction/`: what the documents print, place by place, and where a run's results hold it.
 
-Printed values are text, as printed: their digits say how far they were rounded.
+Printed values are text, as printed: their digits say how far they were rounded. A number that is a cell of summary.csv
+stands beside ours in the tables of every run of its experiment (`printed_for`).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from decimal import Decimal
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
-from typing import Any
+from typing import Annotated, ClassVar, Literal, NamedTuple
 
 import yaml
+from pydantic import Field
 
 from pipeline.common.errors import ConfigError
 from pipeline.common.files import shipped
-from pipeline.config.fields import build, choice, count, fixed, list_of, mapping, number, numbers, one_of, text, texts
+from pipeline.config.fields import Number, Text, Whole, build, schema
 
 FOLDER = shipped("conf") / "reproduction"
 
 
 DOCUMENTS = ("pmke", "global", "pontryagin")
 
+Experiment = Annotated[Text, Field(description="the experiment whose run holds it")]
+MethodOf = Annotated[Text, Field(description="the method, as in summary.csv")]
+Joint = Annotated[Whole, Field(ge=1, description="the joint, from the base, from 1")]
+Names = tuple[Text, ...]
+Pair = Annotated[tuple[Number, ...], Field(min_length=2, max_length=2)]
+Optimum = Annotated[Whole, Field(ge=1, description="the optimum, as in summary.csv")]
 
-@dataclass(frozen=True)
-class Summary:
+
+class Cell(NamedTuple):
+    """Where summary.csv holds a number."""
+
+    method: str
+    optimum: int
+    column: str
+
+
+@schema
+class Found:
+    """Where a run's results hold a number."""
+
+    experiment: Experiment = ""
+
+    @property
+    def experiments(self) -> tuple[str, ...]:
+        """The experiments that the number takes."""
+        return (self.experiment,)
+
+    @property
+    def cell(self) -> Cell | None:
+        """The cell of summary.csv that is the number, if one is."""
+        return None
+
+
+@schema
+class Summary(Found):
     """A cell of summary.csv."""
 
-    kind: str = fixed("summary")
-    experiment: str = text("")
-    method: str = text("")
-    optimum: int = count(1)
-    column: str = text("")
+    method: MethodOf = ""
+    optimum: Optimum = 1
+    column: Annotated[Text, Field(description="the column of summary.csv")] = ""
+    kind: Literal["summary"] = "summary"
+
+    @property
+    def cell(self) -> Cell | None:
+        return Cell(self.method, self.optimum, self.column)
 
 
-@dataclass(frozen=True)
-class Peak:
+@schema
+class Peak(Found):
     """The largest velocity of one joint of a motion, up to a moment: its size, or the largest positive one."""
 
-    kind: str = fixed("peak")
-    experiment: str = text("")
-    method: str = text("")
-    joint: int = count(1)
-    until: float | None = number(None, unit="s")
-    side: str = choice("both", "both", "positive")
+    method: MethodOf = ""
+    joint: Joint = 1
+    until: Annotated[Number | None, Field(description="[s] the moment; null: the end")] = None
+    side: Annotated[Literal["both", "positive"], Field(description="both: by size")] = "both"
+    kind: Literal["peak"] = "peak"
+
+    @property
+    def cell(self) -> Cell | None:
+        whole = self.until is None and self.side == "both"
+        return Cell(self.method, 1, f"peak_velocity_{self.joint}") if whole else None
 
 
-@dataclass(frozen=True)
-class LimitTime:
+@schema
+class LimitTime(Found):
     """From or until when the planner's first optimum is at a limit [s]; a knot's velocity is that of the interval before."""
 
-    kind: str = fixed("limit_time")
-    experiment: str = text("")
-    joint: int = count(1)
-    limit: str = choice("velocity", "velocity", "torque", "power")
-    end: str = choice("from", "from", "until")
+    joint: Joint = 1
+    limit: Annotated[Literal["velocity", "torque", "power"], Field(description="which limit")] = "velocity"
+    end: Annotated[Literal["from", "until"], Field(description="which end of the time")] = "from"
+    kind: Literal["limit_time"] = "limit_time"
 
 
-@dataclass(frozen=True)
-class JointsAtLimit:
+@schema
+class JointsAtLimit(Found):
     """How many joints of the planner's first optimum are at their velocity limits at the same time, at most."""
 
-    kind: str = fixed("joints_at_limit")
-    experiment: str = text("")
+    kind: Literal["joints_at_limit"] = "joints_at_limit"
 
 
-@dataclass(frozen=True)
-class EndEffector:
+@schema
+class EndEffector(Found):
     """A coordinate of the end effector at the first or the last knot of the planner's first optimum [m]."""
 
-    kind: str = fixed("end_effector")
-    experiment: str = text("")
-    axis: str = choice("x", "x", "y", "z")
-    end: str = choice("first", "first", "last")
+    axis: Annotated[Literal["x", "y", "z"], Field(description="which coordinate")] = "x"
+    end: Annotated[Literal["first", "last"], Field(description="which knot")] = "first"
+    kind: Literal["end_effector"] = "end_effector"
 
 
-@dataclass(frozen=True)
-class Validation:
+@schema
+class Validation(Found):
     """A cell of validation.csv, the planner's optima beside the calculus of variations."""
 
-    kind: str = fixed("validation")
-    experiment: str = text("")
-    optimum: int = count(1)
-    column: str = text("")
+    optimum: Optimum = 1
+    column: Annotated[Text, Field(description="the column of validation.csv")] = ""
+    kind: Literal["validation"] = "validation"
+
+    @property
+    def cell(self) -> Cell | None:
+        first = self.column == "stationary_objective" and self.optimum == 1
+        return Cell("calculus_of_variations", 1, "kinetic_energy_integral") if first else None
 
 
-@dataclass(frozen=True)
-class Minima:
+@schema
+class Minima(Found):
     """The number of the planner's optima that continuous time has too."""
 
-    kind: str = fixed("minima")
-    experiment: str = text("")
+    kind: Literal["minima"] = "minima"
 
 
-@dataclass(frozen=True)
-class PowerLaw:
+@schema
+class PowerLaw(Found):
     """The fit of the candidate study: log(distance) = intercept + exponent log(candidates)."""
 
-    kind: str = fixed("power_law")
-    experiment: str = text("")
-    parameter: str = choice("exponent", "exponent", "intercept")
+    parameter: Annotated[Literal["exponent", "intercept"], Field(description="which parameter")] = "exponent"
+    kind: Literal["power_law"] = "power_law"
 
 
-@dataclass(frozen=True)
-class PredictionTime:
+@schema
+class PredictionTime(Found):
     """The mean time of PMKE's predictions [s]: of the optimisation, of everything else, or of the whole."""
 
-    kind: str = fixed("prediction_time")
-    experiment: str = text("")
-    of: str = choice("whole", "whole", "optimisation", "rest")
+    of: Annotated[Literal["whole", "optimisation", "rest"], Field(description="of what")] = "whole"
+    kind: Literal["prediction_time"] = "prediction_time"
 
 
-@dataclass(frozen=True)
-class SpectralRatio:
+@schema
+class SpectralRatio(Found):
     """The largest ratio over time of the spectral radius of M of one motion to that of another."""
 
-    kind: str = fixed("spectral_ratio")
-    experiment: str = text("")
-    method: str = text("")
-    over: str = text("")
+    method: MethodOf = ""
+    over: Annotated[Text, Field(description="the method of the other motion")] = ""
+    kind: Literal["spectral_ratio"] = "spectral_ratio"
 
 
-@dataclass(frozen=True)
-class RangeShare:
+@schema
+class RangeShare(Found):
     """How far the joints of a motion are from the middle of their ranges, at most, relative to half of them."""
 
-    kind: str = fixed("range_share")
-    experiment: str = text("")
-    method: str = text("")
+    method: MethodOf = ""
+    kind: Literal["range_share"] = "range_share"
 
 
-@dataclass(frozen=True)
-class Mass:
+@schema
+class Mass(Found):
     """The identified mass of a link [kg]."""
 
-    kind: str = fixed("mass")
-    experiment: str = text("")
-    link: int = count(1)
+    link: Annotated[Whole, Field(ge=1, description="the link, from the base, from 1")] = 1
+    kind: Literal["mass"] = "mass"
 
 
-SIMPLE = {
-    "summary": Summary,
-    "peak": Peak,
-    "limit_time": LimitTime,
-    "joints_at_limit": JointsAtLimit,
-    "end_effector": EndEffector,
-    "validation": Validation,
-    "minima": Minima,
-    "power_law": PowerLaw,
-    "prediction_time": PredictionTime,
-    "spectral_ratio": SpectralRatio,
-    "range_share": RangeShare,
-    "mass": Mass,
-}
+Simple = Annotated[
+    Summary
+    | Peak
+    | LimitTime
+    | JointsAtLimit
+    | EndEffector
+    | Validation
+    | Minima
+    | PowerLaw
+    | PredictionTime
+    | SpectralRatio
+    | RangeShare
+    | Mass,
+    Field(discriminator="kind"),
+]
 
 
-@dataclass(frozen=True)
+@schema
 class Ratio:
     """`of` over `to`: the ratio, how much larger in percent, or the size of that."""
 
-    kind: str = fixed("ratio")
-    of: Any = one_of(SIMPLE, "summary")
-    to: Any = one_of(SIMPLE, "summary")
-    unit: str = choice("1", "1", "percent", "percent_of_size")
+    of: Simple = Summary()
+    to: Simple = Summary()
+    unit: Annotated[Literal["1", "percent", "percent_of_size"], Field(description="how it is told")] = "1"
+    kind: Literal["ratio"] = "ratio"
+    cell: ClassVar[None] = None
+
+    @property
+    def experiments(self) -> tuple[str, ...]:
+        """The experiments that the number takes, each once."""
+        return tuple(dict.fromkeys((self.of.experiment, self.to.experiment)))
 
 
-NUMBERS = {**SIMPLE, "ratio": Ratio}
-
-
-def experiments(found: Any) -> tuple[str, ...]:
-    """The experiments that one number takes, each once."""
-    parts = (found.of, found.to) if isinstance(found, Ratio) else (found,)
-    return tuple(dict.fromkeys(part.experiment for part in parts))
-
-
-@dataclass(frozen=True)
+@schema
 class Row:
-    """One printed number.
+    """One printed number."""
 
-    reading: another way to read it, if it is a misprint. tolerance: in place of the rounding, with its reason in `why`.
-    between: what words mean as numbers. better: the side on which a value is better. masses: whether the number serves
-    to identify the masses (fit), or is only shown with both (check).
-    """
-
-    quantity: str = text("")
-    printed: str = text("")
-    unit: str = text("")
-    found: Any = one_of(NUMBERS, "summary")
-    reading: str = text("")
-    tolerance: float | None = number(None, above=0)
-    why: str = text("")
-    between: list[float] | None = numbers(None, length=2)
-    better: str = choice("neither", "neither", "lower", "higher")
-    masses: str = choice("no", "no", "fit", "check")
-    note: str = text("")
+    quantity: Annotated[Text, Field(description="what it is")] = ""
+    printed: Annotated[Text, Field(description="as printed")] = ""
+    unit: Annotated[Text, Field(description="of the number")] = ""
+    found: Annotated[
+        Summary
+        | Peak
+        | LimitTime
+        | JointsAtLimit
+        | EndEffector
+        | Validation
+        | Minima
+        | PowerLaw
+        | PredictionTime
+        | SpectralRatio
+        | RangeShare
+        | Mass
+        | Ratio,
+        Field(discriminator="kind"),
+    ] = Summary()
+    reading: Annotated[Text, Field(description="another way to read it, if it is a misprint")] = ""
+    tolerance: Annotated[
+        Annotated[Number, Field(gt=0)] | None, Field(description="in place of the rounding, with its reason in `why`")
+    ] = None
+    why: Annotated[Text, Field(description="the reason of the tolerance")] = ""
+    between: Annotated[Pair | None, Field(description="what words mean as numbers")] = None
+    better: Annotated[
+        Literal["neither", "lower", "higher"], Field(description="the side on which a value is better")
+    ] = "neither"
+    masses: Annotated[
+        Literal["no", "fit", "check"],
+        Field(description="whether it serves to identify the masses (fit), or is only shown with both (check)"),
+    ] = "no"
+    note: Annotated[Text, Field(description="what else there is to say")] = ""
 
     @property
     def value(self) -> float:
@@ -201,44 +253,56 @@ class Row:
         return float(self.reading or self.printed)
 
 
-@dataclass(frozen=True)
+@schema
 class Drawing:
-    """A figure that is drawn again: `draw` names the function of `artifacts/document_figures.py`; `methods` are those of
-    summary.csv, with a number behind from the second optimum on.
-    """
+    """A figure that is drawn again."""
 
-    draw: str = text("")
-    experiments: list[str] = texts()
-    methods: list[str] = texts()
+    draw: Annotated[Text, Field(description="the function of `reproduce/drawings.py`")] = ""
+    experiments: Annotated[Names, Field(description="whose runs it shows")] = ()
+    methods: Annotated[
+        Names, Field(description="those of summary.csv, with a number behind from the second optimum on")
+    ] = ()
 
 
-@dataclass(frozen=True)
+@schema
 class Place:
-    """A table, figure or section of a document, in its order: what stands there and what is printed.
+    """A table, figure or section of a document, in its order: what stands there and what is printed."""
 
-    inputs: what is given, not computed: shown beside the rows, without a verdict.
-    """
+    place: Annotated[Text, Field(description="its name in the document")] = ""
+    caption: Annotated[Text, Field(description="what it shows")] = ""
+    inputs: Annotated[
+        dict[str, Text], Field(description="what is given, not computed: shown beside the rows, without a verdict")
+    ] = field(default_factory=dict)
+    figures: Annotated[tuple[Drawing, ...], Field(description="what is drawn there")] = ()
+    rows: Annotated[tuple[Row, ...], Field(description="what is printed there")] = ()
 
-    place: str = text("")
-    caption: str = text("")
-    inputs: dict[str, str] = mapping()
-    figures: list[Drawing] = list_of(Drawing)
-    rows: list[Row] = list_of(Row)
+
+@schema
+class Mention:
+    """What the tables of an experiment's run say of the document."""
+
+    places: Annotated[Text, Field(description="where it prints the experiment's numbers")] = ""
+    note: Annotated[Text, Field(description="what there is to say of them")] = ""
+    same_as: Annotated[Text, Field(description="the experiment whose numbers are this one's too")] = ""
 
 
-@dataclass(frozen=True)
+@schema
 class Document:
     """One document."""
 
-    name: str = text("")
-    title: str = text("")
-    source: str = text("")
-    places: list[Place] = list_of(Place)
+    name: Annotated[Text, Field(description="of the file")] = ""
+    title: Annotated[Text, Field(description="of the document")] = ""
+    source: Annotated[Text, Field(description="who wrote it, and where it stands")] = ""
+    cited: Annotated[Text, Field(description="how the tables of a run name it")] = ""
+    runs: Annotated[dict[str, Mention], Field(description="what the tables of each experiment's run say of it")] = (
+        field(default_factory=dict)
+    )
+    places: Annotated[tuple[Place, ...], Field(description="its tables, figures and sections")] = ()
 
     @cached_property
     def experiments(self) -> tuple[str, ...]:
         """All experiments that its rows and figures take, in order."""
-        names = [name for place in self.places for row in place.rows for name in experiments(row.found)]
+        names = [name for _, row in self.rows for name in row.found.experiments]
         names += [name for place in self.places for figure in place.figures for name in figure.experiments]
         return tuple(dict.fromkeys(names))
 
@@ -285,3 +349,36 @@ def half_width(printed: str) -> float:
     if not isinstance(exponent, int):
         raise ValueError(f"{printed!r} is not a finite number")
     return float(Decimal((0, (5,), exponent - 1)))
+
+
+@dataclass(frozen=True)
+class Printed:
+    """What a document prints of an experiment: {method: {column of summary.csv: number}}, its name and a note."""
+
+    values: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    document: str = ""
+    note: str = ""
+
+
+def printed_for(experiment: str, folder: Path = FOLDER) -> Printed:
+    """What stands in conf/reproduction/ of the first optima of an experiment; nothing if no document has it."""
+    for name in DOCUMENTS:
+        document = _once(name, folder)
+        if experiment in document.runs:
+            mention = document.runs[experiment]
+            values = _cells(document, mention.same_as or experiment)
+            return Printed(values, ", ".join(filter(None, (document.cited, mention.places))), mention.note)
+    return Printed()
+
+
+_once = cache(read)  # the documents do not change while a process runs
+
+
+def _cells(document: Document, experiment: str) -> dict[str, dict[str, float]]:
+    """The numbers that are cells of summary.csv, of first optima; the first row of those that print the same cell."""
+    values: dict[str, dict[str, float]] = {}
+    for _, row in document.rows:
+        cell = row.found.cell
+        if cell and cell.optimum == 1 and row.between is None and row.found.experiments == (experiment,):
+            values.setdefault(cell.method, {}).setdefault(cell.column, row.value)
+    return values

@@ -2,79 +2,89 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar, Literal, get_args
 
-from pipeline.config.fields import choice, fixed, number, per_joint
+from pydantic import Field
 
-INTEGRALS = ("kinetic_energy", "torque", "base_rotation", "reaction_force", "reaction_torque")
+from pipeline.config.fields import Number, OneOrList, schema
+
+# The words of problem/integrals.py, whose floor is above: what an integral is, no configuration needs to know.
+Integral = Literal["kinetic_energy", "torque", "velocity_norm", "base_rotation", "reaction_force", "reaction_torque"]
+INTEGRALS: tuple[str, ...] = get_args(Integral)
+
+Positive = Annotated[Number, Field(gt=0)]
+Weight = Annotated[Number, Field(ge=0)]
+Share = Annotated[Number, Field(ge=0, le=1)]
 
 
-@dataclass(frozen=True)
+@schema
 class SecondaryConfig:
     """What every objective can have beside it: k0 times a criterion that is to be large."""
 
-    secondary: str = choice("none", "none", "manipulability", "joint_centering", "both")
-    k0: float = number(1.0, low=0)
+    secondary: Annotated[
+        Literal["none", "manipulability", "joint_centering", "both"],
+        Field(description="criterion that is to be large beside the objective; joint_centering: in the joint limits"),
+    ] = "none"
+    k0: Annotated[Weight, Field(description="weight of the criterion: k0 times its integral is taken off")] = 1.0
 
     @property
     def criteria(self) -> tuple[str, ...]:
         return {"none": (), "both": ("manipulability", "joint_centering")}.get(self.secondary, (self.secondary,))
 
 
-@dataclass(frozen=True)
+@schema
 class KineticEnergyConfig(SecondaryConfig):
     """`objective=kinetic_energy`: the integral of the kinetic energy."""
 
-    kind: str = fixed("kinetic_energy")
+    kind: Literal["kinetic_energy"] = "kinetic_energy"
     weights: ClassVar[dict[str, float]] = {"kinetic_energy": 1.0}
 
 
-@dataclass(frozen=True)
+@schema
 class TorqueConfig(SecondaryConfig):
     """`objective=torque`: the integral of the squared joint torques."""
 
-    kind: str = fixed("torque")
+    kind: Literal["torque"] = "torque"
     weights: ClassVar[dict[str, float]] = {"torque": 1.0}
 
 
-@dataclass(frozen=True)
+@schema
 class VelocityNormConfig(SecondaryConfig):
     """`objective=velocity_norm`: the integral of the squared joint velocities."""
 
-    kind: str = fixed("velocity_norm")
+    kind: Literal["velocity_norm"] = "velocity_norm"
     weights: ClassVar[dict[str, float]] = {"velocity_norm": 1.0}
 
 
-@dataclass(frozen=True)
+@schema
 class BaseRotationConfig(SecondaryConfig):
     """`objective=base_rotation`: the integral of a floating base's squared angular velocity."""
 
-    kind: str = fixed("base_rotation")
+    kind: Literal["base_rotation"] = "base_rotation"
     weights: ClassVar[dict[str, float]] = {"base_rotation": 1.0}
 
 
-@dataclass(frozen=True)
+@schema
 class ReactionConfig(SecondaryConfig):
     """`objective=reaction`: weights of the integrals of the squared force and torque on a base that is held."""
 
-    kind: str = fixed("reaction")
-    force: float = number(0.0, low=0, unit="1/(N^2 s)")
-    torque: float = number(1.0, low=0, unit="1/(N^2 m^2 s)")
+    kind: Literal["reaction"] = "reaction"
+    force: Annotated[Weight, Field(description="[1/(N^2 s)] weight of the squared force")] = 0.0
+    torque: Annotated[Weight, Field(description="[1/(N^2 m^2 s)] weight of the squared torque")] = 1.0
 
     @property
     def weights(self) -> dict[str, float]:
         return {"reaction_force": self.force, "reaction_torque": self.torque}
 
 
-@dataclass(frozen=True)
+@schema
 class WeightedConfig(SecondaryConfig):
     """`objective=weighted`: a convex combination of kinetic energy, squared torques and a floating base's rotation."""
 
-    kind: str = fixed("weighted")
-    kinetic_energy: float = number(0.5, low=0, high=1)
-    torque: float = number(0.5, low=0, high=1)
-    base_rotation: float = number(0.0, low=0, high=1)
+    kind: Literal["weighted"] = "weighted"
+    kinetic_energy: Annotated[Share, Field(description="[1/(J s)] weight; the weights add up to 1")] = 0.5
+    torque: Annotated[Share, Field(description="[1/(N^2 m^2 s)] weight of the squared torques")] = 0.5
+    base_rotation: Annotated[Share, Field(description="[s/rad^2] weight of a floating base's rotation")] = 0.0
 
     @property
     def weights(self) -> dict[str, float]:
@@ -86,7 +96,7 @@ ObjectiveConfig = (
 )
 
 
-@dataclass(frozen=True)
+@schema
 class LimitsConfig:
     """Group `limits`: which bounds the motion must keep.
 
@@ -94,17 +104,28 @@ class LimitsConfig:
     torque too, and the power given here); a value given here (one, or one per joint) overrides or adds to them.
     """
 
-    kind: str = choice("none", "none", "joint", "joint_torque_power")
-    lower: float | list[float] | None = per_joint(unit="rad")
-    upper: float | list[float] | None = per_joint(unit="rad")
-    velocity: float | list[float] | None = per_joint(above=0, unit="rad/s")
-    torque: float | list[float] | None = per_joint(above=0, unit="N m")
-    power: float | list[float] | None = per_joint(above=0, unit="W")
-    attitude: float | None = number(None, above=0, high=1.5, unit="rad")
+    kind: Annotated[
+        Literal["none", "joint", "joint_torque_power"],
+        Field(description="which limits of the robot description hold; a value below overrides or adds to them"),
+    ] = "none"
+    lower: Annotated[OneOrList[Number] | None, Field(description="[rad] least joint position, one or per joint")] = None
+    upper: Annotated[OneOrList[Number] | None, Field(description="[rad] largest joint position, the same way")] = None
+    velocity: Annotated[OneOrList[Positive] | None, Field(description="[rad/s] largest joint speed")] = None
+    torque: Annotated[OneOrList[Positive] | None, Field(description="[N m] largest joint torque")] = None
+    power: Annotated[
+        OneOrList[Positive] | None, Field(description="[W] largest |torque x velocity|; no robot description has it")
+    ] = None
+    attitude: Annotated[
+        Annotated[Number, Field(gt=0, le=1.5)] | None,
+        Field(description="[rad] by how much a floating base may turn from its start, at any time"),
+    ] = None
 
 
-@dataclass(frozen=True)
+@schema
 class BoundaryConfig:
     """Group `boundary`: what is prescribed at the ends of the joint motion."""
 
-    kind: str = choice("fixed", "fixed", "free", "cyclic")
+    kind: Annotated[
+        Literal["fixed", "free", "cyclic"],
+        Field(description="fixed: starts at robot.q_init; free: anywhere on its manifold; cyclic: ends as it began"),
+    ] = "fixed"

@@ -2,145 +2,211 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
-from typing import Any
+from typing import Annotated, Any, Literal, get_args
 
-from pipeline.config.fields import choice, choices, count, number, part
-from pipeline.config.goal import INTEGRALS
+from pydantic import Field
+
+from pipeline.config.fields import Number, Whole, Words, schema
+from pipeline.config.goal import Integral, Positive
+
+MethodName = Literal[
+    "lsv",
+    "inertia_weighted",
+    "pmke",
+    "receding",
+    "global",
+    "pareto",
+    "dynamic_programming",
+    "calculus_of_variations",
+    "pontryagin",
+    "pontryagin_as_printed",
+]
+METHODS: tuple[str, ...] = get_args(MethodName)
+
+Step = Annotated[Positive, Field(description="[s] integration step")]
+Gain = Annotated[
+    Number, Field(ge=0, description="[1/s] closed-loop correction of the tracking error; 0: as in the paper")
+]
+Tolerance = Annotated[Positive, Field(description="of the solver, relative to the objective of the start")]
+Iterations = Annotated[Whole, Field(ge=1, description="of the solver, at most")]
+Singular = Annotated[
+    Positive, Field(description="smallest over largest singular value of J below which a motion counts as singular")
+]
+Prediction = Annotated[
+    Literal["problem", "kinetic_energy", "torque"],
+    Field(description="of a prediction; problem: the problem's, kinetic energy in place of torques"),
+]
+Drift = Annotated[Positive, Field(description="[m] tracking error above which the motion is not confirmed")]
 
 
-@dataclass(frozen=True)
+@schema
 class LsvOptions:
     """Least-squares velocities: qd = J+ (xd + gain (x_ref - x))."""
 
-    dt: float = number(0.01, above=0, unit="s")
-    integrator: str = choice("heun", "euler", "heun")
-    gain: float = number(0.0, low=0, unit="1/s")
-    singular_value: float = number(0.03, above=0)
-    max_drift: float = number(0.01, above=0, unit="m")
+    dt: Step = 0.01
+    integrator: Annotated[Literal["euler", "heun"], Field(description="of the joint velocities")] = "heun"
+    gain: Gain = 0.0
+    singular_value: Singular = 0.03
+    max_drift: Drift = 0.01
 
 
-@dataclass(frozen=True)
+@schema
 class PmkeOptions:
     """Predictive minimisation of the kinetic energy: the parameters of Table 2 of its paper."""
 
-    dt: float = number(0.01, above=0, unit="s")
-    prediction_step: float = number(1.0, above=0, unit="s")
-    horizon: int = count(2)
-    update_interval: float = number(0.5, above=0, unit="s")
-    objective: str = choice("problem", "problem", "kinetic_energy", "torque")
-    interpolation: str = choice("quintic", "quintic", "cubic")
-    gain: float = number(0.0, low=0, unit="1/s")
-    tolerance: float = number(1e-8, above=0)
-    singular_value: float = number(0.03, above=0)
-    max_drift: float = number(0.01, above=0, unit="m")
+    dt: Step = 0.01
+    prediction_step: Annotated[Positive, Field(description="[s] spacing of the predicted knots (Delta T)")] = 1.0
+    horizon: Annotated[Whole, Field(ge=1, description="predicted knots (h)")] = 2
+    update_interval: Annotated[Positive, Field(description="[s] between predictions (I)")] = 0.5
+    objective: Prediction = "problem"
+    interpolation: Annotated[
+        Literal["quintic", "cubic"],
+        Field(description="through the predicted knots; quintic: as the paper's end conditions need"),
+    ] = "quintic"
+    gain: Gain = 0.0
+    tolerance: Annotated[Positive, Field(description="of a prediction, relative to its energy")] = 1e-8
+    singular_value: Singular = 0.03
+    max_drift: Drift = 0.01
 
 
-@dataclass(frozen=True)
+@schema
 class RecedingOptions:
-    """PMKE with limits: a receding horizon whose knots are executed as they are."""
+    """PMKE with limits: a receding horizon that keeps limits and obstacles, and whose knots are executed as they are."""
 
-    prediction_step: float = number(1.0, above=0, unit="s")
-    horizon: int = count(2)
-    update_interval: float = number(0.5, above=0, unit="s")
-    objective: str = choice("problem", "problem", "kinetic_energy", "torque")
-    tail: int = count(8, low=0)
-    tolerance: float = number(1e-8, above=0)
+    prediction_step: Annotated[Positive, Field(description="[s] spacing of the knots")] = 1.0
+    horizon: Annotated[Whole, Field(ge=1, description="predicted knots")] = 2
+    update_interval: Annotated[Positive, Field(description="[s] between predictions")] = 0.5
+    objective: Prediction = "problem"
+    tail: Annotated[
+        Whole, Field(ge=0, description="coarse knots from the horizon to the end of the path, against dead ends")
+    ] = 8
+    tolerance: Annotated[Positive, Field(description="of a prediction, relative to its objective")] = 1e-8
 
 
-@dataclass(frozen=True)
+@schema
 class GlobalOptions:
     """The interpolation-based Global Kinematic Planner; counts as in its paper."""
 
-    starts: str = choice("roadmap", "roadmap", "population", "dynamic_programming", "both")
-    solver: str = choice("newton", "newton", "ipopt")
-    nodes: int = count(300, low=2)
-    layers: int = count(6, low=2)
-    configurations: int = count(66)
-    draw: str = choice("normal", "normal", "latin_hypercube", "uniform")
-    candidates: int | None = count(None)
-    optimised: int = count(64)
-    limit_weight: float = number(0.01, low=0)
-    coarse_steps: int = count(25, low=2)
-    tolerance: float = number(1e-8, above=0)
-    max_iterations: int = count(300)
-    same_path: float = number(0.05, above=0, unit="rad")
+    starts: Annotated[
+        Literal["roadmap", "population", "dynamic_programming", "both"],
+        Field(
+            description="where the solver starts from; population: as in the paper; dynamic_programming: r = 1; both: these"
+        ),
+    ] = "roadmap"
+    solver: Annotated[
+        Literal["newton", "ipopt"],
+        Field(description="newton, confirmed by ipopt, where it serves the problem (the log says so); ipopt: alone"),
+    ] = "newton"
+    nodes: Annotated[Whole, Field(ge=8, description="of the roadmap, in each layer")] = 300
+    layers: Annotated[Whole, Field(ge=2, description="of the roadmap, after the first")] = 6
+    configurations: Annotated[
+        Whole, Field(ge=1, description="initial ones by random self-motion (boundaries free and cyclic)")
+    ] = 66
+    draw: Annotated[
+        Literal["normal", "latin_hypercube", "uniform"],
+        Field(description="of the self-motion; uniform reaches every component of the manifold"),
+    ] = "normal"
+    candidates: Annotated[
+        Annotated[Whole, Field(ge=1)] | None,
+        Field(
+            description="weighted-pseudoinverse motions that are ranked; null: (points x joints)^2 of the coarsest grid"
+        ),
+    ] = None
+    optimised: Annotated[Whole, Field(ge=1, description="motions that are optimised on the coarsest grid")] = 64
+    limit_weight: Annotated[
+        Number, Field(ge=0, description="k_L of eq. (14): distance from the joint limits in the ranking")
+    ] = 0.01
+    coarse_steps: Annotated[Whole, Field(ge=2, description="intervals of the coarsest grid, at most")] = 25
+    tolerance: Tolerance = 1e-8
+    max_iterations: Iterations = 300
+    same_path: Annotated[
+        Positive, Field(description="[rad] motions that differ by less at every knot are the same optimum")
+    ] = 0.05
 
 
-@dataclass(frozen=True)
+@schema
 class DynamicProgrammingOptions:
-    """Dynamic programming on a grid of the self-motion manifold (r = 1)."""
+    """Dynamic programming on a grid of the self-motion manifold (r = 1): a certificate for the global optimum."""
 
-    nodes: int = count(360, low=8)
-    intervals: int | None = count(25, low=2)
-    velocity_slack: float = number(0.0, low=0)
-    same_path: float = number(0.2, above=0, unit="rad")
+    nodes: Annotated[Whole, Field(ge=8, description="on the longest manifold along the path")] = 360
+    intervals: Annotated[
+        Annotated[Whole, Field(ge=2)] | None, Field(description="of the time grid; null: those of timing.steps")
+    ] = 25
+    velocity_slack: Annotated[
+        Number, Field(ge=0, description="node spacings by which a step may exceed a velocity limit")
+    ] = 0.0
+    same_path: Annotated[Positive, Field(description="[rad] paths closer than this are the same optimum")] = 0.2
 
 
-@dataclass(frozen=True)
+@schema
 class CalculusOfVariationsOptions:
     """Stationary motions of the kinetic-energy integral (r = 1, no limits)."""
 
-    spacing: float = number(0.03, above=0, unit="rad")
-    refinements: int = count(3, low=0)
-    scan_tolerance: float = number(1e-6, above=0)
-    tolerance: float = number(1e-10, above=0)
-    max_speed: float | None = number(None, above=0, unit="rad/s")
+    spacing: Annotated[Positive, Field(description="[rad] of the scan along the initial self-motion manifold")] = 0.03
+    refinements: Annotated[
+        Whole, Field(ge=0, description="how often a scan interval is split where the final configuration jumps")
+    ] = 3
+    scan_tolerance: Annotated[Positive, Field(description="of the integration while scanning")] = 1e-6
+    tolerance: Annotated[Positive, Field(description="of the integration of the motions found")] = 1e-10
+    max_speed: Annotated[
+        Positive | None,
+        Field(description="[rad/s] largest initial null-space speed scanned for a fixed start; null: chosen by size"),
+    ] = None
 
 
-@dataclass(frozen=True)
+@schema
 class PontryaginOptions:
     """The maximum principle as the two-point boundary-value problem that it is."""
 
-    guesses: int = count(24)
-    intervals: int = count(40, low=4)
-    tolerance: float = number(1e-9, above=0)
-    max_nodes: int = count(20000, low=10)
-    same_path: float = number(0.01, above=0, unit="rad")
+    guesses: Annotated[Whole, Field(ge=1, description="motions that the boundary-value problem is started from")] = 24
+    intervals: Annotated[Whole, Field(ge=4, description="of the mesh it starts on")] = 40
+    tolerance: Annotated[
+        Positive, Field(description="of the collocation's relative residual and of the boundary conditions")
+    ] = 1e-9
+    max_nodes: Annotated[Whole, Field(ge=10, description="of the mesh it ends on")] = 20000
+    same_path: Annotated[
+        Positive, Field(description="[rad] extremals that differ by less at every knot are the same")
+    ] = 0.01
 
 
-@dataclass(frozen=True)
+@schema
 class PontryaginAsPrintedOptions:
-    """The maximum principle as the report prints it, integrated as it stands."""
+    """The maximum principle as the report prints it (eqs (21), (22)), integrated as it stands."""
 
-    dt: float = number(0.01, above=0, unit="s")
-    max_drift: float = number(0.1, above=0, unit="m")
+    dt: Step = 0.01
+    max_drift: Drift = 0.1
 
 
-@dataclass(frozen=True)
+@schema
 class ParetoOptions:
     """The front of two integrals; `planner` finds its extremes and its first motions."""
 
-    method: str = choice("epsilon_constraint", "epsilon_constraint", "weighting")
-    objectives: list[str] = choices(INTEGRALS[:2], *INTEGRALS)
-    steps: int = count(10, low=2)
-    rounds: int = count(3, low=0)
-    tolerance: float = number(1e-8, above=0)
-    max_iterations: int = count(200)
-    planner: GlobalOptions = part(GlobalOptions)
+    method: Annotated[
+        Literal["epsilon_constraint", "weighting"], Field(description="how the points between the extremes are found")
+    ] = "epsilon_constraint"
+    objectives: Annotated[Words[Integral], Field(description="the two integrals")] = ("kinetic_energy", "torque")
+    steps: Annotated[Whole, Field(ge=2, description="of each of the two directions")] = 10
+    rounds: Annotated[Whole, Field(ge=0, description="of starts from both neighbours, at most")] = 3
+    tolerance: Tolerance = 1e-8
+    max_iterations: Iterations = 200
+    planner: Annotated[GlobalOptions, Field(description="set method.global instead")] = GlobalOptions()
 
 
-@dataclass(frozen=True)
+@schema
 class MethodConfig:
     """Group `method`: the options of every method; the key `methods` says which of them run."""
 
-    lsv: LsvOptions = part(LsvOptions)
-    inertia_weighted: LsvOptions = part(LsvOptions)
-    pmke: PmkeOptions = part(PmkeOptions)
-    receding: RecedingOptions = part(RecedingOptions)
-    global_: GlobalOptions = part(GlobalOptions)
-    pareto: ParetoOptions = part(ParetoOptions)
-    dynamic_programming: DynamicProgrammingOptions = part(DynamicProgrammingOptions)
-    calculus_of_variations: CalculusOfVariationsOptions = part(CalculusOfVariationsOptions)
-    pontryagin: PontryaginOptions = part(PontryaginOptions)
-    pontryagin_as_printed: PontryaginAsPrintedOptions = part(PontryaginAsPrintedOptions)
+    lsv: LsvOptions = LsvOptions()
+    inertia_weighted: LsvOptions = LsvOptions()
+    pmke: PmkeOptions = PmkeOptions()
+    receding: RecedingOptions = RecedingOptions()
+    global_: Annotated[GlobalOptions, Field(alias="global")] = GlobalOptions()
+    pareto: ParetoOptions = ParetoOptions()
+    dynamic_programming: DynamicProgrammingOptions = DynamicProgrammingOptions()
+    calculus_of_variations: CalculusOfVariationsOptions = CalculusOfVariationsOptions()
+    pontryagin: PontryaginOptions = PontryaginOptions()
+    pontryagin_as_printed: PontryaginAsPrintedOptions = PontryaginAsPrintedOptions()
 
     def of(self, name: str) -> Any:
         """The options of the method `name`."""
         return getattr(self, "global_" if name == "global" else name)
-
-
-METHODS = tuple(field.name.rstrip("_") for field in fields(MethodConfig))
-
-
-DEFAULT_METHODS = ("lsv", "pmke", "global")

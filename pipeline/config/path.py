@@ -2,56 +2,80 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import Annotated, Literal
 
-from pipeline.config.fields import angle_or_vector, choice, count, fixed, intervals, number, numbers, switch, text
+from pydantic import AfterValidator, Field
+
+from pipeline.config.fields import Number, Numbers, OneOrList, Switch, Text, Vector, Whole, schema
+
+Direction = OneOrList[Number]
+START = "[m] task coordinates of the start; null: the end effector at robot.q_init"
 
 
-@dataclass(frozen=True)
+def _finer(row: tuple[float, ...]) -> tuple[float, ...]:
+    if len(row) != 3 or not 0 <= row[0] < row[1] or not row[2] > 0:
+        raise ValueError("must be [from s, to s, factor] with 0 <= from < to and factor > 0")
+    return row
+
+
+@schema
 class PathConfig:
     """What every path has for tasks with an orientation: the one it starts with, and how far it turns to its end."""
 
-    orientation: list[float] | None = numbers(None, length=3, unit="rad")
-    turn: list[float] = numbers([0.0, 0.0, 0.0], length=3, unit="rad")
+    orientation: Annotated[
+        Vector | None, Field(description="[rad] roll, pitch, yaw at the start, for such tasks; null: at robot.q_init")
+    ] = None
+    turn: Annotated[Vector, Field(description="[rad] rotation vector by which it turns to the end, in the world")] = (
+        0.0,
+        0.0,
+        0.0,
+    )
 
 
-@dataclass(frozen=True)
+@schema
 class LineConfig(PathConfig):
     """`path=line`: straight, `length` m along `direction`."""
 
-    kind: str = fixed("line")
-    length: float = number(0.4, above=0, unit="m")
-    direction: float | list[float] = angle_or_vector(157.5)
-    start: list[float] | None = numbers(None, unit="m")
+    kind: Literal["line"] = "line"
+    length: Annotated[Number, Field(gt=0, description="[m] length of the line")] = 0.4
+    direction: Annotated[Direction, Field(description="[deg] angle in the task plane, or a vector")] = 157.5
+    start: Annotated[Numbers | None, Field(description=START)] = None
 
 
-@dataclass(frozen=True)
+@schema
 class CircleConfig(PathConfig):
     """`path=circle`: through the start, centre `radius` m away along `center_direction`; `angle` deg of it."""
 
-    kind: str = fixed("circle")
-    radius: float = number(0.05, above=0, unit="m")
-    center_direction: float | list[float] = angle_or_vector(180.0)
-    clockwise: bool = switch(False)
-    angle: float = number(360.0, above=0, unit="deg")
-    normal: list[float] = numbers([0.0, 0.0, 1.0], length=3)
-    start: list[float] | None = numbers(None, unit="m")
+    kind: Literal["circle"] = "circle"
+    radius: Annotated[Number, Field(gt=0, description="[m] radius of the circle")] = 0.05
+    center_direction: Annotated[
+        Direction, Field(description="[deg] angle from the start to the centre in the task plane, or a vector")
+    ] = 180.0
+    clockwise: Annotated[Switch, Field(description="which way round, seen against `normal`")] = False
+    angle: Annotated[Number, Field(gt=0, description="[deg] how much of the circle")] = 360.0
+    normal: Annotated[Vector, Field(description="of the circle's plane, for tasks in space")] = (0.0, 0.0, 1.0)
+    start: Annotated[Numbers | None, Field(description=START)] = None
 
 
-@dataclass(frozen=True)
+@schema
 class WaypointsConfig(PathConfig):
     """`path=waypoints`: a smooth curve through the rows of a CSV file."""
 
-    kind: str = fixed("waypoints")
-    file: str = text("")
-    relative: bool = switch(False)
+    kind: Literal["waypoints"] = "waypoints"
+    file: Annotated[Text, Field(description="CSV file with header x,y or x,y,z and values in m")] = ""
+    relative: Annotated[Switch, Field(description="shift the curve so that it starts at the end effector")] = False
 
 
-@dataclass(frozen=True)
+@schema
 class TimingConfig:
     """Group `timing`: the law s(t), the motion time and the number of intervals of the global grid."""
 
-    law: str = choice("raised_cosine", "raised_cosine", "constant_speed", "quintic")
-    duration: float = number(10.0, above=0, unit="s")
-    steps: int = count(100, low=2, high=100_000)
-    dense: list[list[float]] = intervals()
+    law: Annotated[
+        Literal["raised_cosine", "constant_speed", "quintic"], Field(description="how the path is run through in time")
+    ] = "raised_cosine"
+    duration: Annotated[Number, Field(gt=0, description="[s] motion time")] = 10.0
+    steps: Annotated[Whole, Field(ge=2, le=100_000, description="intervals of the grid of the global optimum")] = 100
+    dense: Annotated[
+        tuple[Annotated[Numbers, AfterValidator(_finer)], ...],
+        Field(description="rows [from s, to s, factor]: where that grid is finer than elsewhere"),
+    ] = ()

@@ -2,84 +2,99 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import field
+from typing import Annotated, Literal
 
-from pipeline.config.fields import (
-    any_number,
-    choice,
-    choices,
-    fixed,
-    mapping,
-    number,
-    numbers,
-    per_joint,
-    table_of,
-    text,
-)
+from pydantic import Field
+
+from pipeline.config.fields import Number, Numbers, OneOrList, Text, Vector, Words, schema
+
+Positive = Annotated[Number, Field(gt=0)]
+Edges = Annotated[tuple[Positive, ...], Field(min_length=3, max_length=3)]
+ORIGIN = (0.0, 0.0, 0.0)
 
 
-@dataclass(frozen=True)
+@schema
 class SphereConfig:
     """A sphere."""
 
-    kind: str = fixed("sphere")
-    center: list[float] = numbers([0.0, 0.0, 0.0], length=3, unit="m")
-    radius: float = number(0.1, above=0, unit="m")
+    kind: Literal["sphere"] = "sphere"
+    center: Annotated[Vector, Field(description="[m] centre")] = ORIGIN
+    radius: Annotated[Positive, Field(description="[m] radius")] = 0.1
 
 
-@dataclass(frozen=True)
+@schema
 class BoxConfig:
     """A box: its edges, and roll, pitch, yaw."""
 
-    kind: str = fixed("box")
-    center: list[float] = numbers([0.0, 0.0, 0.0], length=3, unit="m")
-    size: list[float] = numbers([0.1, 0.1, 0.1], length=3, above=0, unit="m")
-    rpy: list[float] = numbers([0.0, 0.0, 0.0], length=3, unit="rad")
+    kind: Literal["box"] = "box"
+    center: Annotated[Vector, Field(description="[m] centre")] = ORIGIN
+    size: Annotated[Edges, Field(description="[m] edges")] = (0.1, 0.1, 0.1)
+    rpy: Annotated[Vector, Field(description="[rad] roll, pitch, yaw")] = ORIGIN
 
 
-@dataclass(frozen=True)
+@schema
 class CapsuleConfig:
     """All points within `radius` of the segment from start to end."""
 
-    kind: str = fixed("capsule")
-    start: list[float] = numbers([0.0, 0.0, 0.0], length=3, unit="m")
-    end: list[float] = numbers([0.0, 0.0, 0.1], length=3, unit="m")
-    radius: float = number(0.1, above=0, unit="m")
+    kind: Literal["capsule"] = "capsule"
+    start: Annotated[Vector, Field(description="[m] one end of the segment")] = ORIGIN
+    end: Annotated[Vector, Field(description="[m] the other end")] = (0.0, 0.0, 0.1)
+    radius: Annotated[Positive, Field(description="[m] distance from the segment")] = 0.1
 
 
-SHAPES = {"sphere": SphereConfig, "box": BoxConfig, "capsule": CapsuleConfig}
+Shape = Annotated[SphereConfig | BoxConfig | CapsuleConfig, Field(discriminator="kind")]
 
 
-@dataclass(frozen=True)
+@schema
 class RobotConfig:
     """Group `robot`: the description, the end effector, what of it is prescribed, and where the arm starts."""
 
-    name: str = text("planar3r")
-    urdf: str = text("robots/planar3r.urdf")
-    base: str | None = text(None)
-    end_effector: str = text("tip")
-    offset: list[float] = numbers([0.0, 0.0, 0.0], length=3, unit="m")
-    offset_rpy: list[float] = numbers([0.0, 0.0, 0.0], length=3, unit="rad")
-    base_position: list[float] = numbers([0.0, 0.0, 0.0], length=3, unit="m")
-    base_rpy: list[float] = numbers([0.0, 0.0, 0.0], length=3, unit="rad")
-    payload: float = number(0.0, low=0, unit="kg")
-    armature: float | list[float] = per_joint(0.0, low=0, unit="kg m^2")
-    task: list[str] = choices(["x", "y"], "x", "y", "z")
-    orientation: str = choice("none", "none", "full", "pointing")
-    pointing: list[float] = numbers([0.0, 0.0, 1.0], length=3)
-    collision: dict[str, list[SphereConfig | BoxConfig | CapsuleConfig]] | None = table_of(SHAPES, listed=True)
-    q_init: list[float] | None = numbers([0.0, 0.327, -0.754], unit="rad", optional=True)
-    locked: dict[str, float] | None = mapping(any_number, optional=True)
+    name: Annotated[Text, Field(description="of the robot, in tables and figures")] = "planar3r"
+    urdf: Annotated[
+        Text, Field(description="URDF or SDF file: absolute, relative, one of robots/, or package://package/file")
+    ] = "robots/planar3r.urdf"
+    base: Annotated[Text | None, Field(description="first link of the chain; null: the root link")] = None
+    end_effector: Annotated[Text, Field(description="last link of the chain")] = "tip"
+    offset: Annotated[Vector, Field(description="[m] end-effector frame in that link")] = ORIGIN
+    offset_rpy: Annotated[Vector, Field(description="[rad] its roll, pitch, yaw there")] = ORIGIN
+    base_position: Annotated[Vector, Field(description="[m] where the root link stands")] = ORIGIN
+    base_rpy: Annotated[Vector, Field(description="[rad] roll, pitch, yaw of the root link")] = ORIGIN
+    payload: Annotated[Number, Field(ge=0, description="[kg] point mass at the end effector")] = 0.0
+    armature: Annotated[
+        OneOrList[Annotated[Number, Field(ge=0)]],
+        Field(description="[kg m^2] rotor inertia as the joints feel it, one or one per joint"),
+    ] = 0.0
+    task: Annotated[
+        Words[Literal["x", "y", "z"]], Field(description="prescribed world coordinates of the end effector")
+    ] = ("x", "y")
+    orientation: Annotated[
+        Literal["none", "full", "pointing"],
+        Field(description="what of the orientation is prescribed; pointing: the direction of the axis `pointing`"),
+    ] = "none"
+    pointing: Annotated[Vector, Field(description="axis in the end effector's frame")] = (0.0, 0.0, 1.0)
+    collision: Annotated[
+        dict[str, tuple[Shape, ...]] | None,
+        Field(description="{link: [{kind: sphere, box or capsule, ...}, ...]}; null: the primitive shapes of the file"),
+    ] = None
+    q_init: Annotated[Numbers | None, Field(description="[rad] initial configuration, base to tip")] = (
+        0.0,
+        0.327,
+        -0.754,
+    )
+    locked: Annotated[
+        dict[str, Number] | None, Field(description="{joint: position [rad or m], ...} of joints that are held")
+    ] = None
 
 
-@dataclass(frozen=True)
+@schema
 class FixedBaseConfig:
     """`base=fixed`: the root link stands where robot.base_position puts it."""
 
-    kind: str = fixed("fixed")
+    kind: Literal["fixed"] = "fixed"
 
 
-@dataclass(frozen=True)
+@schema
 class FreeBaseConfig:
     """`base=free`: the root link is bolted to a spacecraft that floats; its pose at the start is robot.base_position's.
 
@@ -87,18 +102,30 @@ class FreeBaseConfig:
     inertia: one moment for all axes, three, or ixx, iyy, izz, ixy, ixz, iyz, about com in the frame of the root link.
     """
 
-    kind: str = fixed("free")
-    mass: float | None = number(None, above=0, unit="kg")
-    inertia: float | list[float] = per_joint(0.0, unit="kg m^2")
-    com: list[float] = numbers([0.0, 0.0, 0.0], length=3, unit="m")
-    linear_momentum: list[float] = numbers([0.0, 0.0, 0.0], length=3, unit="N s")
-    angular_momentum: list[float] = numbers([0.0, 0.0, 0.0], length=3, unit="N m s")
+    kind: Literal["free"] = "free"
+    mass: Annotated[
+        Positive | None,
+        Field(description="[kg] of the spacecraft, beside the root link's own; null: the root link is the base"),
+    ] = None
+    inertia: Annotated[
+        OneOrList[Number],
+        Field(description="[kg m^2] about com in the root link's frame: one, [ixx, iyy, izz], or [..., ixy, ixz, iyz]"),
+    ] = 0.0
+    com: Annotated[Vector, Field(description="[m] centre of mass of the spacecraft in that frame")] = ORIGIN
+    linear_momentum: Annotated[Vector, Field(description="[N s] of the whole system, in the world")] = ORIGIN
+    angular_momentum: Annotated[
+        Vector, Field(description="[N m s] of it, about the place where the root link starts")
+    ] = ORIGIN
 
 
-@dataclass(frozen=True)
+@schema
 class ObstaclesConfig:
     """Group `obstacles`: solids in the world, by name, and the clearance that moving links keep from them."""
 
-    margin: float = number(0.02, above=0, unit="m")
-    influence: float = number(0.05, above=0, unit="m")
-    shapes: dict[str, SphereConfig | BoxConfig | CapsuleConfig] = table_of(SHAPES)
+    margin: Annotated[Positive, Field(description="[m] least distance of a moving link")] = 0.02
+    influence: Annotated[
+        Positive, Field(description="[m] beyond the margin, from where on the solver feels an obstacle")
+    ] = 0.05
+    shapes: Annotated[
+        dict[str, Shape], Field(description="{name: {kind: sphere, box or capsule, ...}, ...} in the world")
+    ] = field(default_factory=dict)

@@ -6,84 +6,68 @@ Defaults here equal the files under `conf/` (a test compares them), so that the 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any, Literal
 
-from pipeline.config.fields import build, choices, count, one_of, part, switch, text, word_or_vector
-from pipeline.config.goal import (
-    BaseRotationConfig,
-    BoundaryConfig,
-    KineticEnergyConfig,
-    LimitsConfig,
-    ObjectiveConfig,
-    ReactionConfig,
-    TorqueConfig,
-    VelocityNormConfig,
-    WeightedConfig,
-)
-from pipeline.config.methods import DEFAULT_METHODS, METHODS, MethodConfig
+from pydantic import Field
+
+from pipeline.config.fields import Switch, Text, Whole, WordOrVector, Words, build, schema
+from pipeline.config.goal import BoundaryConfig, KineticEnergyConfig, LimitsConfig, ObjectiveConfig
+from pipeline.config.methods import MethodConfig, MethodName
 from pipeline.config.path import CircleConfig, LineConfig, TimingConfig, WaypointsConfig
 from pipeline.config.robot import FixedBaseConfig, FreeBaseConfig, ObstaclesConfig, RobotConfig
-from pipeline.config.studies import (
-    CandidateStudyConfig,
-    ClosedLoopConfig,
-    ExportConfig,
-    IdentificationConfig,
-    PublishedConfig,
-)
+from pipeline.config.studies import CandidateStudyConfig, ClosedLoopConfig, ExportConfig, IdentificationConfig
 
 
-@dataclass(frozen=True)
+@schema
 class ParallelConfig:
     """Group `parallel`: how independent solves are spread."""
 
-    workers: int | None = count(None)
-    address: str | None = text(None)
+    workers: Annotated[Annotated[Whole, Field(ge=1)] | None, Field(description="local processes; null: all cores")] = (
+        None
+    )
+    address: Annotated[
+        Text | None, Field(description="of a running Dask scheduler, such as tcp://127.0.0.1:8786; null: none")
+    ] = None
 
 
-@dataclass(frozen=True)
+@schema
 class SweepConfig:
     """What a sweep does besides its runs."""
 
-    resume: bool = switch(True)
+    resume: Annotated[
+        Switch, Field(description="skip runs that are finished when a sweep is started again in its hydra.sweep.dir")
+    ] = True
 
 
-@dataclass(frozen=True)
+@schema
 class RunConfig:
     """Everything that one run needs."""
 
-    name: str = text("run")
-    methods: list[str] = choices(DEFAULT_METHODS, *METHODS)
-    seed: int = count(1, low=0)
-    robot: RobotConfig = part(RobotConfig)
-    base: FixedBaseConfig | FreeBaseConfig = one_of({"fixed": FixedBaseConfig, "free": FreeBaseConfig}, "fixed")
-    path: LineConfig | CircleConfig | WaypointsConfig = one_of(
-        {"line": LineConfig, "circle": CircleConfig, "waypoints": WaypointsConfig}, "line"
+    name: Annotated[Text, Field(description="of the experiment: names the folder under outputs/")] = "run"
+    methods: Annotated[Words[MethodName], Field(description="which methods run, in this order")] = (
+        "lsv",
+        "pmke",
+        "global",
     )
-    timing: TimingConfig = part(TimingConfig)
-    objective: ObjectiveConfig = one_of(
-        {
-            "kinetic_energy": KineticEnergyConfig,
-            "torque": TorqueConfig,
-            "velocity_norm": VelocityNormConfig,
-            "base_rotation": BaseRotationConfig,
-            "reaction": ReactionConfig,
-            "weighted": WeightedConfig,
-        },
-        "kinetic_energy",
-    )
-    gravity: str | list[float] = word_or_vector("none", "none", "earth", unit="m/s^2")
-    limits: LimitsConfig = part(LimitsConfig)
-    boundary: BoundaryConfig = part(BoundaryConfig)
-    obstacles: ObstaclesConfig = part(ObstaclesConfig)
-    method: MethodConfig = part(MethodConfig)
-    parallel: ParallelConfig = part(ParallelConfig)
-    sweep: SweepConfig = part(SweepConfig)
-    candidate_study: CandidateStudyConfig = part(CandidateStudyConfig)
-    export: ExportConfig = part(ExportConfig)
-    closed_loop: ClosedLoopConfig = part(ClosedLoopConfig)
-    identification: IdentificationConfig = part(IdentificationConfig)
-    published: PublishedConfig = part(PublishedConfig)
+    seed: Annotated[Whole, Field(ge=0, description="of every random draw")] = 1
+    robot: RobotConfig = RobotConfig()
+    base: Annotated[FixedBaseConfig | FreeBaseConfig, Field(discriminator="kind")] = FixedBaseConfig()
+    path: Annotated[LineConfig | CircleConfig | WaypointsConfig, Field(discriminator="kind")] = LineConfig()
+    timing: TimingConfig = TimingConfig()
+    objective: Annotated[ObjectiveConfig, Field(discriminator="kind")] = KineticEnergyConfig()
+    gravity: Annotated[
+        WordOrVector[Literal["none", "earth"]], Field(description="[m/s^2] acceleration in the world")
+    ] = "none"
+    limits: LimitsConfig = LimitsConfig()
+    boundary: BoundaryConfig = BoundaryConfig()
+    obstacles: ObstaclesConfig = ObstaclesConfig()
+    method: MethodConfig = MethodConfig()
+    parallel: ParallelConfig = ParallelConfig()
+    sweep: SweepConfig = SweepConfig()
+    candidate_study: CandidateStudyConfig = CandidateStudyConfig()
+    export: ExportConfig = ExportConfig()
+    closed_loop: ClosedLoopConfig = ClosedLoopConfig()
+    identification: IdentificationConfig = IdentificationConfig()
 
 
 def check(values: Mapping[str, Any]) -> RunConfig:

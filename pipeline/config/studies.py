@@ -2,54 +2,56 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import Annotated, Literal
 
-from pipeline.config.fields import choice, choices, count, mapping, number, switch, table_of_numbers, text
-from pipeline.config.methods import METHODS
+from pydantic import Field
+
+from pipeline.config.fields import Number, Switch, Whole, Words, schema
+from pipeline.config.methods import MethodName
+
+Positive = Annotated[Number, Field(gt=0)]
 
 
-@dataclass(frozen=True)
+@schema
 class CandidateStudyConfig:
     """The Global paper's Fig. 1: how near the best of so many candidates comes to the optimum."""
 
-    run: bool = switch(False)
-    most: int = count(10000, low=100)
-    repeats: int = count(5)
+    run: Annotated[Switch, Field(description="whether it is made, see experiment candidate_study")] = False
+    most: Annotated[Whole, Field(ge=100, description="candidates")] = 10000
+    repeats: Annotated[Whole, Field(ge=1, description="populations that are averaged")] = 5
 
 
-@dataclass(frozen=True)
+@schema
 class ExportConfig:
-    """The motion that is written for a controller: `best`, the cheapest confirmed one, `none`, or that of one method."""
+    """The motion that is written for a controller: motion.csv, and motion.yaml and motion.json for ROS 2."""
 
-    method: str = choice("best", "best", "none", *METHODS)
-    rate: float = number(100.0, above=0, high=10_000, unit="Hz")
+    method: Annotated[
+        Literal["best", "none", MethodName],
+        Field(description="best: the cheapest confirmed motion; none; or the first of one method"),
+    ] = "best"
+    rate: Annotated[Number, Field(gt=0, le=10_000, description="[Hz] of the points")] = 100.0
 
 
-@dataclass(frozen=True)
+@schema
 class IdentificationConfig:
-    """The masses of the links from the numbers that documents print (see experiment identify_masses)."""
+    """The masses of the links from the numbers that documents print, see experiment identify_masses."""
 
-    run: bool = switch(False)
-    documents: list[str] = choices(["pmke", "global"], "pmke", "global")
-    confidence: float = number(0.95, above=0, high=0.999)
+    run: Annotated[Switch, Field(description="whether it is made")] = False
+    documents: Annotated[
+        Words[Literal["pmke", "global"]], Field(description="whose rows in conf/reproduction/ say how they count")
+    ] = ("pmke", "global")
+    confidence: Annotated[Number, Field(gt=0, le=0.999, description="of the intervals")] = 0.95
 
 
-@dataclass(frozen=True)
+@schema
 class ClosedLoopConfig:
-    """Drake's Simulator follows the exported motion with a torque-limited inverse-dynamics controller."""
+    """The exported motion in Drake's Simulator, under a torque-limited inverse-dynamics controller."""
 
-    run: bool = switch(False)
-    bandwidth: float = number(20.0, above=0, unit="rad/s")
-    damping: float = number(1.0, above=0)
-    sampling: float = number(1000.0, above=0, high=100_000, unit="Hz")
-    mass_error: float = number(0.0, above=-1)
-    initial_error: float = number(0.0, unit="rad")
-
-
-@dataclass(frozen=True)
-class PublishedConfig:
-    """Printed numbers that a run is compared against: data for the tables, never used in solving."""
-
-    document: str = text("")
-    note: str = text("")
-    values: dict[str, dict[str, float]] = mapping(table_of_numbers)
+    run: Annotated[Switch, Field(description="whether it is simulated")] = False
+    bandwidth: Annotated[Positive, Field(description="[rad/s] of the controller")] = 20.0
+    damping: Annotated[Positive, Field(description="ratio of the controller")] = 1.0
+    sampling: Annotated[Number, Field(gt=0, le=100_000, description="[Hz] of the controller")] = 1000.0
+    mass_error: Annotated[
+        Number, Field(gt=-1, description="relative: by how much the controller takes the arm for heavier than it is")
+    ] = 0.0
+    initial_error: Annotated[Number, Field(description="[rad] of every joint at the start")] = 0.0

@@ -40,7 +40,8 @@ def main() -> int:
     from pipeline.run.main import run_job
 
     hooks = "hydra.callbacks.session._target_=pipeline.describe.session.Session"
-    return run_job(job, ["hydra.run.dir=outputs/describe/${robot.name}", hooks])
+    own = ["hydra.run.dir=outputs/describe/${robot.name}", hooks]
+    return run_job(job, own, "python -m pipeline.describe", ("robot", "gravity"))
 
 
 if __name__ == "__main__":

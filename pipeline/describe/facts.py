@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,7 +36,7 @@ class Facts:
     notes: list[str]
 
 
-def inspect(robot: RobotConfig, gravity: str | list[float] = "none") -> Facts:
+def inspect(robot: RobotConfig, gravity: str | Sequence[float] = "none") -> Facts:
     """Load the arm and look at it; raises RobotError, one line, if it cannot be used."""
     arm = load(robot, gravity)
     description = arm.description
@@ -51,10 +52,11 @@ def inspect(robot: RobotConfig, gravity: str | list[float] = "none") -> Facts:
         notes.append(f"robot.q_init of {description.joints[joint]} is outside its limits")
     if description.meshes and not description.collision:
         notes.append("collision shapes are meshes: for obstacles give spheres, boxes or capsules in robot.collision")
-    if arm.payload > 0:
-        notes.append(f"a payload of {arm.payload:g} kg at the end effector")
-    if np.any(arm.armature):
-        notes.append(f"rotor inertia {', '.join(f'{a:g}' for a in arm.armature)} kg m^2 added to the joints")
+    if arm.mounting.payload > 0:
+        notes.append(f"a payload of {arm.mounting.payload:g} kg at the end effector")
+    rotors = arm.mounting.rotors(arm.n)
+    if rotors.any():
+        notes.append(f"rotor inertia {', '.join(f'{a:g}' for a in rotors)} kg m^2 added to the joints")
     missing = [
         mesh
         for mesh in description.pictures

@@ -7,17 +7,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.common.arrays import Array
-from pipeline.evaluation.free_body import Floating, integrate, reactions
+from pipeline.evaluation.free_body import FreeMotion, integrate, reactions
 from pipeline.evaluation.plant import SinglePlant
 from pipeline.evaluation.sums import running_integral
-from pipeline.model.base import FloatingArm
 from pipeline.problem.problem import Boundary, Problem
 from pipeline.problem.solution import Solution, Trajectory
 
 
 @dataclass(frozen=True)
-class Base:
-    """The base: position (N + 1, 3) [m], rotation (N + 1, 3, 3) and turn from the start (N + 1,) [rad] at the knots.
+class BaseMotion:
+    """What a base does: position (N + 1, 3) [m], rotation (N + 1, 3, 3) and turn from the start (N + 1,) [rad] at the knots.
 
     reaction (N + 1, 6) [N, N m]: what holds a base that stands still; None if it floats. integrals, running (N + 1,):
     base_rotation, reaction_force, reaction_torque. floating: the motion that the joints alone give; None if it stands.
@@ -28,27 +27,27 @@ class Base:
     turn: Array
     reaction: Array | None
     integrals: dict[str, Array]
-    floating: Floating | None
+    floating: FreeMotion | None
 
 
 def base_motion(
     problem: Problem, solution: Solution, place: Array, way: Array, turn: Array, joints: tuple[Array, Array, Array]
-) -> Base:
-    """What the base does: pose at the knots, from the solution; the rest from the joint motion alone (`base_motion.py`)."""
+) -> BaseMotion:
+    """What the base does: pose at the knots, from the solution; the rest from the joint motion alone (`free_body.py`)."""
     arm, time = problem.task.arm, solution.trajectory.time
     dt, nothing = np.diff(time), np.zeros(len(time))
-    if not isinstance(arm, FloatingArm) or not arm.floats:
+    if arm.base.kind != "floating":
         reaction = reactions(arm, *joints)
         reaction[0] = reaction[0] if problem.boundary is Boundary.CYCLIC else 0.0
         force, torque = ((reaction[:, part] ** 2).sum(axis=1) for part in (slice(3), slice(3, 6)))
         integrals = {"reaction_force": running_integral(force, dt), "reaction_torque": running_integral(torque, dt)}
-        return Base(place, way, turn, reaction, {"base_rotation": nothing, **integrals}, None)
+        return BaseMotion(place, way, turn, reaction, {"base_rotation": nothing, **integrals}, None)
     steps = way[1:] @ way[:-1].swapaxes(1, 2)
     rate = np.concatenate([[0.0], angle_between(np.eye(3), steps) / dt])
     integrals = {"base_rotation": running_integral(rate**2, dt), "reaction_force": nothing, "reaction_torque": nothing}
     finite = np.isfinite(joints[0]).all() and len(time) >= 4 and solution.found
-    floating = integrate(problem, arm, time, joints[0]) if finite else None
-    return Base(place, way, turn, None, integrals, floating)
+    floating = integrate(problem, time, joints[0]) if finite else None
+    return BaseMotion(place, way, turn, None, integrals, floating)
 
 
 def angle_between(start: Array, rotation: Array) -> Array:

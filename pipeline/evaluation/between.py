@@ -9,10 +9,10 @@ from scipy.interpolate import CubicSpline
 
 from pipeline.common.arrays import Array
 from pipeline.evaluation.base import angle_between
-from pipeline.evaluation.limits import clearances, excesses, limit_excess
+from pipeline.evaluation.clearance import Clearance
+from pipeline.evaluation.limits import excesses, limit_excess
 from pipeline.evaluation.plant import SinglePlant
 from pipeline.evaluation.sums import weighted_sum
-from pipeline.model.clearance import Clearance
 from pipeline.problem.problem import Boundary, Problem
 from pipeline.problem.solution import Trajectory
 
@@ -23,7 +23,7 @@ BETWEEN = 10  # sub-intervals per knot interval on which the motion between knot
 
 
 def between_knots(
-    problem: Problem, plant: SinglePlant, scene: Clearance | None, trajectory: Trajectory, qd_start: Array
+    problem: Problem, plant: SinglePlant, clearance: Clearance, trajectory: Trajectory, qd_start: Array
 ) -> tuple[float, float, float, float, float, dict[str, float]]:
     """The cubic spline through the knots: kinetic-energy integral (Simpson), objective, largest tracking and orientation
     errors, smallest clearance, excess of limits.
@@ -55,10 +55,9 @@ def between_knots(
             secondary[i] = plant.secondary(problem, q[i])
     rates = (energy, (qd[:, nb:] ** 2).sum(axis=1), secondary, spinning)
     integral, norm, gain, spun = (float(rate.reshape(len(dt), -1) @ weights @ dt) for rate in rates)
-    unknown = float("nan")
-    of_base = {"base_rotation": spun, "reaction_force": unknown, "reaction_torque": unknown}
-    objective = weighted_sum(problem, integral, unknown, norm, gain, of_base)
-    clear = float(clearances(scene, q[:: BETWEEN // CLEARANCES]).min())
+    first_order = {"kinetic_energy": integral, "velocity_norm": norm, "base_rotation": spun}
+    objective = weighted_sum(problem, first_order, gain)
+    clear = float(clearance(q[:: BETWEEN // CLEARANCES]).min())
     excess = limit_excess(problem, q, qd, tau, clear, float(turn.max()))
     return integral, objective, float(error.max()), float(turned.max()), clear, excess
 
@@ -82,13 +81,12 @@ def audit(problem: Problem, time: Array, q: Array, qd: Array, qdd: Array) -> Aud
         error[i], turned[i] = plant.task_error(problem.task, targets[i])
         tau[i] = plant.torque(qdd[i])
         turn[i] = angle_between(plant.start, plant.base()[1][None])[0]
-    scene = None if problem.obstacles is None else Clearance(problem.task.arm, problem.obstacles)
-    clearance = clearances(scene, q)
+    clearance = Clearance(problem.task.arm, problem.obstacles)(q)
     worst = {
         kind: tuple(int(place) for place in np.unravel_index(int(np.argmax(excess)), excess.shape))
         for kind, excess in excesses(problem, q, qd, tau).items()
     }
-    if scene is not None:
+    if problem.obstacles is not None:
         worst["clearance"] = (int(np.argmin(clearance)), 0)
     if np.isfinite(problem.bounds.attitude):
         worst["attitude"] = (int(np.argmax(turn)), 0)

@@ -11,12 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.common.arrays import Array
-from pipeline.evaluation.base import Base, angle_between, base_motion, entered_cycle
+from pipeline.evaluation.base import BaseMotion, angle_between, base_motion, entered_cycle
 from pipeline.evaluation.between import between_knots
-from pipeline.evaluation.limits import LIMITS, clearances, limit_excess
+from pipeline.evaluation.clearance import Clearance
+from pipeline.evaluation.limits import LIMITS, limit_excess
 from pipeline.evaluation.plant import SinglePlant
 from pipeline.evaluation.sums import differences, running_integral, weighted_sum
-from pipeline.model.clearance import Clearance
 from pipeline.problem.problem import Boundary, Problem
 from pipeline.problem.solution import Solution, Status
 
@@ -43,9 +43,7 @@ class Evaluation:
     tracking_error: Array  # (N + 1,) [m]
     orientation_error: Array  # (N + 1,) [rad] angle to the prescribed orientation or direction; zero without one
     kinetic_energy: Array  # (N + 1,) T
-    energy_integral: Array  # (N + 1,) of T, running
-    torque_integral: Array  # (N + 1,) of tau'tau, running
-    velocity_norm_integral: Array  # (N + 1,) of qd'qd, running
+    integrals: dict[str, Array]  # (N + 1,) running, by the names in the catalogue (`problem/integrals.py`)
     secondary: Array  # (N + 1,) w, the sum of the objective's secondary criteria; zero without one
     objective: float  # the weighted sum of the integrals, less k0 times the trapezoidal integral of w
     objective_spline: float  # the same of the cubic spline through the knots; nan if torques count
@@ -58,7 +56,7 @@ class Evaluation:
     clearance_between: float  # smallest along that spline
     limit_excess: dict[str, float]  # by kind, at the knots, relative; see limit_excess()
     limit_excess_between: dict[str, float]  # the same along that spline
-    base: Base
+    base: BaseMotion
 
     @property
     def method(self) -> str:
@@ -69,10 +67,24 @@ class Evaluation:
         """`global`, `global 2`, ...: the method and, from the second on, its optimum."""
         return self.method if self.solution.optimum == 1 else f"{self.method} {self.solution.optimum}"
 
+    @property
+    def energy_integral(self) -> Array:
+        """(N + 1,) of T, running."""
+        return self.integrals["kinetic_energy"]
+
+    @property
+    def torque_integral(self) -> Array:
+        """(N + 1,) of tau'tau, running."""
+        return self.integrals["torque"]
+
+    @property
+    def velocity_norm_integral(self) -> Array:
+        """(N + 1,) of qd'qd, running."""
+        return self.integrals["velocity_norm"]
+
     def integral(self, name: str) -> float:
-        """One of problem.INTEGRALS at the end of the motion."""
-        own = {"kinetic_energy": self.energy_integral, "torque": self.torque_integral}
-        return float((own[name] if name in own else self.base.integrals[name])[-1])
+        """One of them at the end of the motion."""
+        return float(self.integrals[name][-1])
 
     @property
     def confirmed(self) -> bool:
@@ -87,11 +99,11 @@ def evaluate(problem: Problem, solution: Solution) -> Evaluation:
     dt = np.diff(time)
     qd, qdd = differences(trajectory, problem.boundary, problem.reference.timing.at_rest)
     plant = SinglePlant(arm)
-    if arm.floats and problem.boundary is Boundary.CYCLIC:
+    if arm.base.kind == "floating" and problem.boundary is Boundary.CYCLIC:
         qd, qdd = entered_cycle(plant, trajectory, qd)
     count, n = q.shape
     tau, energy, radius = np.full((count, n), np.nan), np.full(count, np.nan), np.full(count, np.nan)
-    skeleton, singular = np.full((count, n - arm.base_coordinates + 1, 3), np.nan), np.full(count, np.nan)
+    skeleton, singular = np.full((count, n - arm.base.count + 1, 3), np.nan), np.full(count, np.nan)
     place, way = np.full((count, 3), np.nan), np.full((count, 3, 3), np.nan)
     tracking, turned, targets = np.full(count, np.nan), np.full(count, np.nan), problem.reference.position(time)
     for i in np.flatnonzero(np.isfinite(np.hstack([q, qd, qdd])).all(axis=1)):  # Drake refuses other values
@@ -106,19 +118,19 @@ def evaluate(problem: Problem, solution: Solution) -> Evaluation:
     # At the first knot nothing has been spent yet: the interval's values stand at its end.
     tau[0] = tau[0] if problem.boundary is Boundary.CYCLIC else 0.0
     position = skeleton[:, -1]
-    scene = None if problem.obstacles is None else Clearance(arm, problem.obstacles)
-    clearance = clearances(scene, q)
+    distances = Clearance(arm, problem.obstacles)
+    clearance = distances(q)
     turn = angle_between(plant.start, way)
     excess = limit_excess(problem, q, qd, tau, float(clearance.min()), float(turn.max()))
     spline_integral, spline_objective, between, turned_between, clear_between, excess_between = between_knots(
-        problem, plant, scene, trajectory, qd[0]
+        problem, plant, distances, trajectory, qd[0]
     )
     secondary = np.array([plant.secondary(problem, qi) for qi in q]) if problem.objective.secondary else np.zeros(count)
     moving = q
-    q, qd, qdd, tau = (values[:, arm.base_coordinates :] for values in (q, qd, qdd, tau))
+    q, qd, qdd, tau = (values[:, arm.joints] for values in (q, qd, qdd, tau))
     base = base_motion(problem, solution, place, way, turn, (q, qd, qdd))
-    energy_integral, torque_integral = running_integral(energy, dt), running_integral((tau**2).sum(axis=1), dt)
-    velocity_norm_integral = running_integral((qd**2).sum(axis=1), dt)
+    rates = {"kinetic_energy": energy, "torque": (tau**2).sum(axis=1), "velocity_norm": (qd**2).sum(axis=1)}
+    integrals = {name: running_integral(rate, dt) for name, rate in rates.items()} | base.integrals
 
     status, message = solution.status, solution.message
     if status is Status.SOLVED:
@@ -138,17 +150,12 @@ def evaluate(problem: Problem, solution: Solution) -> Evaluation:
         tracking_error=tracking,
         orientation_error=turned,
         kinetic_energy=energy,
-        energy_integral=energy_integral,
-        torque_integral=torque_integral,
-        velocity_norm_integral=velocity_norm_integral,
+        integrals=integrals,
         secondary=secondary,
         objective=weighted_sum(
             problem,
-            float(energy_integral[-1]),
-            float(torque_integral[-1]),
-            float(velocity_norm_integral[-1]),
+            {name: float(running[-1]) for name, running in integrals.items()},
             float(np.trapezoid(secondary, time)),
-            {name: float(running[-1]) for name, running in base.integrals.items()},
         ),
         objective_spline=spline_objective,
         singular_value=singular,

@@ -12,16 +12,15 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from pydrake.math import RigidTransform, RotationMatrix
-from pydrake.multibody.parsing import Parser
+from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import FixedOffsetFrame, MultibodyForces, RotationalInertia, SpatialInertia, UnitInertia
+from pydrake.multibody.tree import MultibodyForces, RotationalInertia, SpatialInertia, UnitInertia
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 from pipeline.common.arrays import Array
+from pipeline.evaluation.plant import add_arm
 from pipeline.model.arm import Arm
-from pipeline.model.base import FloatingArm
 from pipeline.problem.problem import Problem
 
 STEPS = 1000  # of RK4 at least, along the whole motion
@@ -31,7 +30,7 @@ LEAST = 4  # of them in every interval
 
 
 @dataclass(frozen=True)
-class Floating:
+class FreeMotion:
     """A floating base's motion, integrated at times (S,) [s]: position (S, 3) [m] and rotation of the root link.
 
     linear, angular: the largest error of the system's momentum between those times, relative to the largest momentum
@@ -50,35 +49,22 @@ class BasePlant:
     """The arm and its spacecraft as one free body with joints; velocities are [w, v of the root link's origin, qd_m]."""
 
     def __init__(self, arm: Arm) -> None:
-        fixed = arm.on_fixed_base if isinstance(arm, FloatingArm) else arm
-        xml, root = fixed.description.for_drake
-        plant = self.plant = MultibodyPlant(0.0)
-        (model,) = Parser(plant).AddModelsFromString(xml, "urdf")
-        self.root = plant.GetBodyByName(root, model)
-        link = plant.GetFrameByName(fixed.description.end_effector, model)
-        tool = RigidTransform(RotationMatrix(Rotation.from_euler("xyz", fixed.offset_rpy).as_matrix()), fixed.offset)
-        self.end = plant.AddFrame(FixedOffsetFrame("end", link, tool, model))
-        if fixed.payload > 0:
-            ball = plant.AddRigidBody("load", model, SpatialInertia.SolidSphereWithMass(fixed.payload, 1e-6))
-            plant.WeldFrames(self.end, ball.body_frame())
-        if isinstance(arm, FloatingArm) and arm.spacecraft.mass > 0:
-            craft = arm.spacecraft
+        fixed, plant, craft = arm.on_fixed_base.description, MultibodyPlant(0.0), arm.base.spacecraft
+        parts = add_arm(plant, fixed, arm.mounting)
+        self.plant, self.root, self.end = plant, parts.root.body(), parts.end
+        if craft.mass > 0:
             (xx, xy, xz), (_, yy, yz), (_, _, zz) = craft.inertia
             about = RotationalInertia(xx, yy, zz, xy, xz, yz)
             unit = UnitInertia().SetFromRotationalInertia(about, craft.mass)
-            body = plant.AddRigidBody("craft", model, SpatialInertia(craft.mass, np.zeros(3), unit))
-            plant.WeldFrames(self.root.body_frame(), body.body_frame(), RigidTransform(list(craft.com)))
-        joints = [plant.GetJointByName(name, model) for name in fixed.description.joints]
-        for joint, inertia in zip(joints, fixed.armature, strict=True):
-            plant.AddJointActuator(joint.name(), joint).set_default_rotor_inertia(inertia)
-        plant.mutable_gravity_field().set_gravity_vector(fixed.gravity)
+            body = plant.AddRigidBody("craft", parts.model, SpatialInertia(craft.mass, np.zeros(3), unit))
+            plant.WeldFrames(parts.root, body.body_frame(), RigidTransform(list(craft.com)))
         plant.Finalize()
         self.context, self.forces = plant.CreateDefaultContext(), MultibodyForces(plant)
         first = self.root.floating_velocities_start_in_v()
-        self.base, self.joints = np.arange(first, first + 6), [joint.velocity_start() for joint in joints]
-        self.places = [joint.position_start() for joint in joints]
+        self.base, self.joints = np.arange(first, first + 6), [joint.velocity_start() for joint in parts.joints]
+        self.places = [joint.position_start() for joint in parts.joints]
         self.floating = np.arange(7) + self.root.floating_positions_start()  # w, x, y, z and the position
-        self.start = Rotation.from_euler("xyz", fixed.base_rpy).as_quat(), fixed.base_position
+        self.start = Rotation.from_euler("xyz", arm.mounting.base_rpy).as_quat(), np.array(arm.mounting.base_position)
 
     def at(self, position: Array, quaternion: Array, q: Array, velocity: Array) -> None:
         """quaternion (4,), last component real. velocity (6 + joints,): [w, v, qd_m]."""
@@ -124,9 +110,10 @@ def reactions(arm: Arm, q: Array, qd: Array, qdd: Array) -> Array:
     return out
 
 
-def integrate(problem: Problem, arm: FloatingArm, time: Array, q: Array) -> Floating:
+def integrate(problem: Problem, time: Array, q: Array) -> FreeMotion:
     """The base under the joint motion through q (N + 1, joints) at the knots time (N + 1,)."""
-    plant, momentum = BasePlant(arm), np.array(arm.spacecraft.momentum, dtype=float)
+    arm = problem.task.arm
+    plant, momentum = BasePlant(arm), np.array(arm.base.spacecraft.momentum, dtype=float)
     joints = CubicSpline(time, q)
     parts = max(LEAST, -(-STEPS // (len(time) - 1)))
     fine = np.interp(np.arange(parts * (len(time) - 1) + 1) / parts, np.arange(len(time)), time)
@@ -163,7 +150,7 @@ def integrate(problem: Problem, arm: FloatingArm, time: Array, q: Array) -> Floa
 
 def _check(
     problem: Problem, plant: BasePlant, time: Array, position: Array, quaternion: Array, joints: Any, momentum: Array
-) -> Floating:
+) -> FreeMotion:
     """The momentum of the integrated motion half-way between its steps, from splines through it; continuous quaternions."""
     moved, turned = CubicSpline(time, position), CubicSpline(time, quaternion)
     middle = (time[1:] + time[:-1]) / 2
@@ -185,7 +172,7 @@ def _check(
     for i in range(len(time)):
         plant.at(position[i], quaternion[i], q[i], np.zeros(6 + q.shape[1]))
         off[i] = np.linalg.norm(plant.tip()[rows] - target[i, : len(rows)])
-    return Floating(time, position, Rotation.from_quat(quaternion), linear, angular_error, float(off.max()))
+    return FreeMotion(time, position, Rotation.from_quat(quaternion), linear, angular_error, float(off.max()))
 
 
 def _angular_velocity(quaternion: Array, rate: Array) -> Array:

@@ -5,19 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.common.arrays import Array
-from pipeline.model.clearance import Clearance
 from pipeline.problem.problem import Problem
 
 LIMITS = 1e-6  # relative: how well a method that promises limits must keep them at its knots
-
-
-def clearances(scene: Clearance | None, q: Array) -> Array:
-    if scene is None:
-        return np.full(len(q), np.inf)
-    finite = np.isfinite(q).all(axis=1)
-    clearance = np.full(len(q), np.nan)
-    clearance[finite] = scene.smallest(q[finite])
-    return clearance
 
 
 def limit_excess(

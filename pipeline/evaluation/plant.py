@@ -1,10 +1,13 @@
 """One arm in a plant of its own, evaluated knot by knot through Drake's own energy, torque and pose calls.
 
-It shares nothing with the stacked plants and the scaling of the solvers (`arm.py`, `transcription.py`): what the evaluation
-says of a motion comes from here.
+It shares nothing with the stacked plants and the scaling of the solvers (`pipeline.model`, `pipeline.program`): what the
+evaluation says of a motion comes from here.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
@@ -15,36 +18,60 @@ from scipy.spatial.transform import Rotation
 
 from pipeline.common.arrays import Array
 from pipeline.model.arm import Arm
-from pipeline.model.base import FloatingArm
 from pipeline.model.task import PositionTask, Task
 from pipeline.problem.problem import Problem
+from pipeline.robot.description import Description
+from pipeline.robot.mounting import Mounting
+
+
+@dataclass(frozen=True)
+class Parts:
+    """What `add_arm` has added: Drake's model, the frame of its root, the end-effector frame, and its joints in order."""
+
+    model: Any
+    root: Any
+    end: Any
+    joints: list[Any]
+
+
+def add_arm(plant: Any, description: Description, mounting: Mounting) -> Parts:
+    """Add one arm with its tool frame, payload, rotors and gravity to a plant; it does not stand on anything yet."""
+    xml, root = description.for_drake
+    (model,) = Parser(plant).AddModelsFromString(xml, "urdf")
+    link = plant.GetFrameByName(description.end_effector, model)
+    tool = RigidTransform(RotationMatrix(Rotation.from_euler("xyz", mounting.offset_rpy).as_matrix()), mounting.offset)
+    end = plant.AddFrame(FixedOffsetFrame("evaluated_point", link, tool, model))
+    plant.mutable_gravity_field().set_gravity_vector(mounting.gravity)
+    joints = [plant.GetJointByName(name, model) for name in description.joints]
+    own = joints[description.base_coordinates :]
+    for joint, inertia in zip(own, mounting.rotors(len(own)), strict=True):
+        plant.AddJointActuator(joint.name(), joint).set_default_rotor_inertia(inertia)
+    if mounting.payload > 0:
+        # A ball so small that it is a point, which Drake's check of inertias also lets pass.
+        ball = plant.AddRigidBody("load", model, SpatialInertia.SolidSphereWithMass(mounting.payload, 1e-6))
+        plant.WeldFrames(end, ball.body_frame())
+    return Parts(model, plant.GetFrameByName(root, model), end, joints)
+
+
+def weld(plant: Any, root: Any, mounting: Mounting) -> Array:
+    """Let the frame `root` stand where the mounting says; returns its rotation matrix (3, 3)."""
+    turn = np.asarray(Rotation.from_euler("xyz", mounting.base_rpy).as_matrix())
+    plant.WeldFrames(plant.world_frame(), root, RigidTransform(RotationMatrix(turn), mounting.base_position))
+    return turn
 
 
 class SinglePlant:
     """One arm in a plant of its own, its rotor inertias in Drake's actuators."""
 
     def __init__(self, arm: Arm) -> None:
-        xml, root = arm.description.for_drake
         plant = self.plant = MultibodyPlant(0.0)
-        (model,) = Parser(plant).AddModelsFromString(xml, "urdf")
-        self.start = Rotation.from_euler("xyz", arm.base_rpy).as_matrix()
-        stand = RigidTransform(RotationMatrix(self.start), arm.base_position)
-        plant.WeldFrames(plant.world_frame(), plant.GetFrameByName(root, model), stand)
-        link = plant.GetFrameByName(arm.description.end_effector, model)
-        tool = RigidTransform(RotationMatrix(Rotation.from_euler("xyz", arm.offset_rpy).as_matrix()), arm.offset)
-        self.end = plant.AddFrame(FixedOffsetFrame("evaluated_point", link, tool, model))
-        plant.mutable_gravity_field().set_gravity_vector(arm.gravity)
-        self.joints = [plant.GetJointByName(name, model) for name in arm.description.joints]
-        for joint, inertia in zip(self.joints, arm.armature, strict=True):
-            plant.AddJointActuator(joint.name(), joint).set_default_rotor_inertia(inertia)
-        if arm.payload > 0:
-            # A ball so small that it is a point, which Drake's check of inertias also lets pass.
-            ball = plant.AddRigidBody("load", model, SpatialInertia.SolidSphereWithMass(arm.payload, 1e-6))
-            plant.WeldFrames(self.end, ball.body_frame())
+        parts = add_arm(plant, arm.description, arm.mounting)
+        self.start = weld(plant, parts.root, arm.mounting)
         plant.Finalize()
+        self.end, self.joints = parts.end, parts.joints
         self.order = np.array([joint.position_start() for joint in self.joints])
-        self.arm, self.nb = arm, arm.base_coordinates
-        self.root = plant.GetBodyByName(arm.description.drake_name(arm.description.base), model)
+        self.arm, self.nb = arm, arm.base.count
+        self.root = plant.GetBodyByName(arm.description.drake_name(arm.description.base), parts.model)
         self.context = plant.CreateDefaultContext()
         self.forces = MultibodyForces(plant)
 
@@ -86,20 +113,28 @@ class SinglePlant:
         return float((self.root.EvalSpatialVelocityInWorld(self.context).rotational() ** 2).sum())
 
     def motion_map(self) -> Array:
-        """All velocities by the joints' (N, n): B of `floating.py`."""
+        """All velocities by the joints' (N, n): [-M_bb^-1 M_bm; I] on a base that floats, [0; I] on one that stands still."""
         n, nb = len(self.order), self.nb
         out = np.vstack([np.zeros((nb, n - nb)), np.eye(n - nb)])
-        if self.arm.floats:
+        if self.arm.base.kind == "floating":
             inertia = self.mass_matrix()
             out[:nb] = -np.linalg.solve(inertia[:nb, :nb], inertia[:nb, nb:])
         return out
 
     def drift(self) -> Array:
-        """The velocities (N,) of a floating base whose system has momentum, its joints at rest."""
-        q, out = np.asarray(self.plant.GetPositions(self.context))[self.order], np.zeros(len(self.order))
-        if isinstance(self.arm, FloatingArm) and self.arm.floats:
-            inertia = self.mass_matrix()[: self.nb, : self.nb]
-            out[: self.nb] = np.linalg.solve(inertia, self.arm.momentum(q[None])[0])
+        """The velocities (N,) of a floating base whose system has momentum, its joints at rest: M_bb^-1 p.
+
+        p is what the linear and angular momentum do along the base's coordinates: by the Jacobian of the root link.
+        """
+        out, momentum = np.zeros(len(self.order)), np.array(self.arm.base.spacecraft.momentum, dtype=float)
+        if momentum.any():
+            world, own = self.plant.world_frame(), self.root.body_frame()
+            both = self.plant.CalcJacobianSpatialVelocity(
+                self.context, JacobianWrtVariable.kV, own, np.zeros(3), world, world
+            )[:, self.order[: self.nb]]
+            shift = self.base()[0] - self.arm.mounting.base_position
+            about_root = np.concatenate([momentum[3:] - np.cross(shift, momentum[:3]), momentum[:3]])
+            out[: self.nb] = np.linalg.solve(self.mass_matrix()[: self.nb, : self.nb], both.T @ about_root)
         return out
 
     def secondary(self, problem: Problem, q: Array) -> float:

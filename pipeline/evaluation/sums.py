@@ -27,20 +27,11 @@ def differences(trajectory: Trajectory, boundary: Boundary, at_rest: bool) -> tu
     return qd, np.vstack([change[-1] if boundary is Boundary.CYCLIC else np.zeros_like(first), change])
 
 
-def weighted_sum(
-    problem: Problem, energy: float, torque: float, norm: float, secondary: float, base: Mapping[str, float]
-) -> float:
-    """The objective from its integrals; a term without weight does not count, even where it is not known."""
-    weights = problem.objective
-    k0 = weights.secondary.k0 if weights.secondary else 0.0
-    terms = (
-        (weights.kinetic_energy, energy),
-        (weights.torque, torque),
-        (weights.velocity_norm, norm),
-        (-k0, secondary),
-        *((getattr(weights, name), value) for name, value in base.items()),
-    )
-    return sum(weight * term for weight, term in terms if weight)
+def weighted_sum(problem: Problem, integrals: Mapping[str, float], secondary: float) -> float:
+    """The objective from its integrals by name; one that is not known does not matter unless it counts."""
+    objective = problem.objective
+    total = sum(weight * integrals.get(name, np.nan) for name, weight in objective.weights.items())
+    return total - objective.secondary.k0 * secondary if objective.secondary else total
 
 
 def running_integral(rate: Array, dt: Array) -> Array:

@@ -48,8 +48,8 @@ class Serves:
 
     def _unmet(self, problem: Problem) -> str | None:
         task, boundary = problem.task, problem.boundary
-        if not self.moving_base and task.arm.base_coordinates:
-            return "the base moves, or is held for its reaction"
+        if not self.moving_base and task.arm.base.count:
+            return f"the base is {task.arm.base.kind}"
         if self.redundancy not in (None, task.redundancy):
             return f"the redundancy degree is {task.redundancy}"
         if self.order == 1 and problem.objective.second_order:

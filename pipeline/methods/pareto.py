@@ -8,7 +8,7 @@ improves, so that a front that jumps between classes of paths is followed.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -23,10 +23,10 @@ from pipeline.methods.global_planner.planner import TRACKING, global_planner
 from pipeline.methods.method import ANY, Context, Method
 from pipeline.problem.costs import integrals
 from pipeline.problem.limits import LIMIT_KINDS
-from pipeline.problem.objective import IntegralBounds, Objective
+from pipeline.problem.objective import Objective
 from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Solution, Status, Trajectory
-from pipeline.program.program import Transcription
+from pipeline.program.transcription import transcribe
 from pipeline.search.selection import path_distance
 
 SAME_CLASS = 0.6  # [rad] neighbouring points of one class of paths differ by less at every knot
@@ -66,7 +66,7 @@ def solve(problem: Problem, options: ParetoOptions, context: Context) -> list[So
     found: dict[str, Point] = {}
     for own in sorted((first, second), key=lambda name: name == VANISHING):
         other = second if own == first else first
-        objective = _only(own)
+        objective = Objective({own: 1.0})
         if own == VANISHING and other in found:
             objective = _kept_unique(own, other, found[other], options)
         optima = global_planner(replace(problem, objective=objective), options.planner, context)
@@ -104,7 +104,7 @@ def refuses(problem: Problem, options: ParetoOptions) -> str | None:
     """Two integrals make a front, and the planner must serve each of them."""
     if len(options.objectives) != 2:
         return f"method.pareto.objectives = [{', '.join(options.objectives)}]: a front is one of two integrals"
-    each = (replace(problem, objective=_only(name)) for name in options.objectives)
+    each = (replace(problem, objective=Objective({name: 1.0})) for name in options.objectives)
     return next((why for own in each if (why := global_planner.why_not(own, options.planner))), None)
 
 
@@ -163,10 +163,10 @@ def _try(
 
 def _solve_point(shared: tuple[Problem, ParetoOptions], item: tuple[Point, Array]) -> Point:
     (problem, options), (point, guess) = shared, item
-    bounds = IntegralBounds() if point.bounded is None else IntegralBounds(**{point.bounded: point.bound})
+    bounds = {} if point.bounded is None else {point.bounded: point.bound}
     objective = _objective(options, point.weights)
-    stated = replace(problem, objective=objective, integral_bounds=bounds)
-    q, outcome, _ = Transcription(stated, problem.times, guess).solve(
+    stated = replace(problem, objective=objective, bounds_of_integrals=bounds)
+    q, outcome, _ = transcribe(stated, problem.times, guess).solve(
         tolerance=options.tolerance, max_iterations=options.max_iterations
     )
     converged = outcome.converged and stays_on_path(problem, problem.times, q)
@@ -175,7 +175,7 @@ def _solve_point(shared: tuple[Problem, ParetoOptions], item: tuple[Point, Array
 
 def _values(problem: Problem, options: ParetoOptions, q: Array) -> tuple[float, float]:
     costs = integrals(problem, problem.times, q)
-    first, second = (float(getattr(costs, name)) for name in options.objectives)
+    first, second = (costs.integrals[name] for name in options.objectives)
     return first, second
 
 
@@ -184,24 +184,16 @@ def _kept_unique(own: str, other: str, extreme: Point, options: ParetoOptions) -
 
     extreme: the other's optimum, at which both integrals set the scale.
     """
-    values = dict(zip(options.objectives, extreme.values, strict=True))
-    return _sum({own: 1.0, other: LITTLE * values[own] / values[other]})
-
-
-def _only(name: str) -> Objective:
-    return _sum({name: 1.0})
-
-
-def _sum(weights: Mapping[str, float]) -> Objective:
-    return replace(Objective(kinetic_energy=0.0), **weights)  # type: ignore[arg-type]
+    values: dict[str, float] = dict(zip(options.objectives, extreme.values, strict=True))
+    return Objective({own: 1.0, other: LITTLE * values[own] / values[other]})
 
 
 def _objective(options: ParetoOptions, weights: tuple[float, float]) -> Objective:
-    return _sum(dict(zip(options.objectives, weights, strict=True)))
+    return Objective(dict(zip(options.objectives, weights, strict=True)))
 
 
 def _weighted(options: ParetoOptions, weights: Array) -> Objective:
-    return _sum(dict(zip(options.objectives, (weights / weights.sum()).tolist(), strict=True)))
+    return Objective(dict(zip(options.objectives, (weights / weights.sum()).tolist(), strict=True)))
 
 
 def _report(problem: Problem, points: Sequence[Point], options: ParetoOptions) -> list[Solution]:

@@ -7,7 +7,8 @@ Sources: PMKE paper Section 2.1, Global paper Section 2; derivatives: see each m
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -15,37 +16,25 @@ import numpy as np
 from pydrake.multibody.tree import JacobianWrtVariable
 
 from pipeline.common.arrays import Array
-from pipeline.model.stack import BLOCK, STEP, Stack, Vector
+from pipeline.model.base import FIXED, Base
+from pipeline.model.stack import BLOCK, STEP, Stack
 from pipeline.robot import urdf
 from pipeline.robot.description import Description
+from pipeline.robot.mounting import Mounting
 
 
 class Arm:
-    """A serial arm with n joints, mounted in the world, and its end-effector frame.
+    """A serial arm, mounted on a base, and its end-effector frame.
 
-    `description` comes from `pipeline.urdf.read`. offset (3,) [m], offset_rpy (3,) [rad]: the end-effector frame in its
-    link. base_position (3,) [m], base_rpy (3,) [rad]: where the root link stands. gravity (3,) [m/s^2]. payload [kg]: a
-    point mass at the end effector. armature: rotor inertia [kg m^2] (or [kg]), one or (n,), added to the diagonal of M.
+    `description` comes from `pipeline.robot.urdf.read`. Its n coordinates are those of the base, of which a fixed one has
+    none, and behind them the joints: q[:, arm.joints]. `arm.description` names all of them.
     """
 
-    def __init__(
-        self,
-        description: Description,
-        offset: Vector = (0.0, 0.0, 0.0),
-        *,
-        offset_rpy: Vector = (0.0, 0.0, 0.0),
-        base_position: Vector = (0.0, 0.0, 0.0),
-        base_rpy: Vector = (0.0, 0.0, 0.0),
-        gravity: Vector = (0.0, 0.0, 0.0),
-        payload: float = 0.0,
-        armature: float | Vector = 0.0,
-    ) -> None:
-        self.description = description
-        self.n = len(description.joints)
-        self.offset, self.offset_rpy = np.asarray(offset, dtype=float), np.asarray(offset_rpy, dtype=float)
-        self.base_position, self.base_rpy = np.asarray(base_position, dtype=float), np.asarray(base_rpy, dtype=float)
-        self.gravity, self.payload = np.asarray(gravity, dtype=float), float(payload)
-        self.armature = np.broadcast_to(np.asarray(armature, dtype=float), self.n).copy()
+    def __init__(self, description: Description, mounting: Mounting = Mounting(), base: Base = FIXED) -> None:
+        self._on_fixed_base, self.mounting, self.base = description, mounting, base
+        self.description = base.extend(description)
+        self.n = len(self.description.joints)
+        self.joints = slice(base.count, self.n)
         self._stacks: dict[int, Stack] = {}
 
     @classmethod
@@ -53,42 +42,46 @@ class Arm:
         cls,
         file: str | Path,
         end_effector: str,
+        mounting: Mounting = Mounting(),
+        base: Base = FIXED,
         *,
-        base: str | None = None,
-        offset: Sequence[float] = (0.0, 0.0, 0.0),
+        root: str | None = None,
         locked: Mapping[str, float] | None = None,
-        **mounting: Any,
     ) -> Arm:
-        """The chain from `base` (the root if None) to the link `end_effector` of a URDF or SDF file; raises RobotError."""
-        return cls(urdf.read(file, end_effector, base, locked), offset, **mounting)
+        """The chain from the link `root` (None: the file's root) to the link `end_effector` of a URDF or SDF file.
 
-    # --- the base: it stands still; see floating.py for one that moves -------------------------------------------
+        locked: positions [rad or m] of joints that do not move. Raises RobotError.
+        """
+        return cls(urdf.read(file, end_effector, root, locked), mounting, base)
 
-    @property
-    def floats(self) -> bool:
-        """Whether the base is free, without forces from outside."""
-        return False
+    # --- the base -----------------------------------------------------------------------------------------------
 
-    @property
-    def base_coordinates(self) -> int:
-        """How many of the n coordinates, the first ones, are the base's."""
-        return self.description.base_coordinates
+    @cached_property
+    def on_fixed_base(self) -> Arm:
+        """The same arm where its base stands still at its start and has no coordinates."""
+        return self if self.base.count == 0 else Arm(self._on_fixed_base, self.mounting)
 
     def motion_map(self, q: Array) -> Array:
-        """B (K, n, joints): all velocities by the joints'."""
-        return np.broadcast_to(np.eye(self.n), (len(q), self.n, self.n))
+        """B (K, n, joints): all velocities by the joints', less those that the base has of itself (`base.drift`)."""
+        return self.base.motion_map(self, q)
 
     def follow(self, q: Array, qd: Array) -> Array:
-        """qd (K, n) with the velocities that the base has under the joints' velocities in it."""
-        return qd
+        """qd (K, n) with the velocities that the base has under the joints' in it: B qd_m + d."""
+        return (self.motion_map(q) @ qd[:, self.joints, None])[:, :, 0] + self.base.drift(self, q)
 
     def lift(self, q: Array, inverse_weight: Array) -> Array:
-        """What (K, joints, joints) inverse weights of the joints' velocities are to all n."""
-        return inverse_weight
+        """B W^-1 B' (K, n, n): what (K, joints, joints) inverse weights of the joints are to all coordinates."""
+        spread = self.motion_map(q)
+        return np.asarray(spread @ inverse_weight @ spread.swapaxes(1, 2))
+
+    def reduced_inertia(self, q: Array) -> Array:
+        """M* = B' M B (K, joints, joints)."""
+        spread = self.motion_map(q)
+        return np.asarray(spread.swapaxes(1, 2) @ self.mass_matrix(q) @ spread)
 
     def inverse_inertia(self, q: Array) -> Array:
-        """M^-1 (K, n, n), as a weight of the joints' velocities."""
-        return np.linalg.inv(self.mass_matrix(q))
+        """B M*^-1 B' (K, n, n): the inverse inertia as a weight of the joints' velocities."""
+        return self.lift(q, np.linalg.inv(self.reduced_inertia(q)))
 
     # --- kinematics ---------------------------------------------------------------------------------------------
 
@@ -140,7 +133,7 @@ class Arm:
 
     def first_joint(self) -> Array:
         """Where the first joint stands (3,) [m] in the world."""
-        stack = Stack(self, 1)
+        stack = Stack(self.description, self.mounting, 1)
         frame = stack.plant.GetJointByName(self.description.joints[0]).frame_on_parent()
         return np.asarray(frame.CalcPoseInWorld(stack.context).translation())
 
@@ -264,6 +257,23 @@ class Arm:
         by_q, by_qd = both[:, : self.n], both[:, self.n :]
         return 0.5 * (qd * by_qd).sum(axis=1), by_q, by_qd
 
+    def momentum_gradient(self, q: Array, qd: Array) -> tuple[Array, Array]:
+        """The generalized momentum M(q) qd (K, n) [N m s] and its derivative by q (K, n, n), by central differences."""
+
+        def one(stack: Stack, q: Array, qd: Array) -> Array:
+            out = np.empty((stack.size, stack.n, 1 + stack.n))
+            for j, unit in enumerate(np.eye(stack.n)):
+                stack.at(q + STEP * unit)
+                ahead = stack.inertial(qd)
+                stack.at(q - STEP * unit)
+                out[:, :, 1 + j] = (ahead - stack.inertial(qd)) / (2 * STEP)
+            stack.at(q)
+            out[:, :, 0] = stack.inertial(qd)
+            return out
+
+        both = self._map(one, q, qd)
+        return both[:, :, 0], both[:, :, 1:]
+
     def inverse_dynamics_gradient(self, q: Array, qd: Array, qdd: Array) -> tuple[Array, Array, Array, Array]:
         """tau (K, n) and dtau/dq, dtau/dqd, dtau/dqdd = M, each (K, n, n) with [k, i, j] = d tau_i / d x_j.
 
@@ -302,7 +312,7 @@ class Arm:
         for start in range(0, count, BLOCK):
             size = min(BLOCK, count - start)
             if size not in self._stacks:
-                self._stacks[size] = Stack(self, size)
+                self._stacks[size] = Stack(self.description, self.mounting, size)
             yield one(self._stacks[size], *(argument[start : start + size] for argument in arguments))
 
     def _position_and_jacobian(self, stack: Stack, q: Array) -> Array:

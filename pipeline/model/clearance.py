@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,21 +16,11 @@ from scipy.spatial.transform import Rotation
 
 from pipeline.common.arrays import Array
 from pipeline.model.arm import Arm
+from pipeline.model.obstacles import Obstacles
 from pipeline.model.stack import assemble
 from pipeline.robot.shapes import Shape
 
 FAR = 1e3  # [m] what a clearance is where there is nothing to be clear of
-
-
-@dataclass(frozen=True)
-class Obstacles:
-    """Solids in the world, the least distance [m] that moving links must keep from them, and from how much farther on [m]
-    they are felt by the solver.
-    """
-
-    shapes: tuple[Shape, ...]
-    margin: float
-    influence: float = 0.05
 
 
 class Clearance:
@@ -42,8 +31,7 @@ class Clearance:
         description = arm.description
         builder = DiagramBuilder()
         self.plant, scene = AddMultibodyPlantSceneGraph(builder, 0.0)
-        xml, root = description.for_drake
-        model, _ = assemble(arm, self.plant, xml, root, Parser(self.plant))
+        model, _ = assemble(self.plant, Parser(self.plant), description, arm.mounting)
         self.names: dict[Any, str] = {}
         bodies = [
             self.plant.GetBodyByName(description.drake_name(str(shape.frame)), model) for shape in description.collision

@@ -25,12 +25,10 @@ def weighted_pseudoinverse(jacobian: Array, inverse_weight: Array) -> Array:
 
 def least_velocity(arm: Arm, q: Array, jacobian: Array, *, weighted: bool = False) -> Array:
     """J+ (K, n, m), or the inertia-weighted inverse, for J (K, m, n) at q (K, n); on a floating base of the generalized
-    Jacobian: B (J B)+ , so that the base follows the joints (`floating.py`).
+    Jacobian: B (J B)+, so that the base follows the joints (`floating.py`).
     """
     if weighted:
         return weighted_pseudoinverse(jacobian, arm.inverse_inertia(q))
-    if not arm.base_coordinates:
-        return pseudoinverse(jacobian)
     spread = arm.motion_map(q)
     return np.asarray(spread @ pseudoinverse(jacobian @ spread))
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
@@ -12,12 +11,8 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import FixedOffsetFrame, MultibodyForces, SpatialInertia, UnitInertia
 
 from pipeline.common.arrays import Array
-
-if TYPE_CHECKING:
-    from pipeline.model.arm import Arm
-
-Vector = Sequence[float] | Array
-
+from pipeline.robot.description import Description
+from pipeline.robot.mounting import Mounting
 
 BLOCK = 16  # copies per plant: beyond this Drake's cost per knot no longer falls
 
@@ -25,17 +20,18 @@ BLOCK = 16  # copies per plant: beyond this Drake's cost per knot no longer fall
 STEP = 1e-5  # central differences of smooth rigid-body functions: truncation and rounding balance near 1e-10
 
 
-def assemble(arm: Arm, plant: Any, xml: str, base: str, parser: Any) -> tuple[Any, Any]:
-    """Add one copy of the arm, mounted and with what it carries; returns its model and its end-effector frame."""
+def assemble(plant: Any, parser: Any, description: Description, mounting: Mounting) -> tuple[Any, Any]:
+    """Add one copy of the arm, mounted and with its payload; returns its model and its end-effector frame."""
+    xml, root = description.for_drake
     (model,) = parser.AddModelsFromString(xml, "urdf")
-    mount = RigidTransform(RollPitchYaw(arm.base_rpy), arm.base_position)
-    plant.WeldFrames(plant.world_frame(), plant.GetFrameByName(base, model), mount)
-    tip = plant.GetFrameByName(arm.description.end_effector, model)
-    if np.any(arm.offset) or np.any(arm.offset_rpy):
-        tool = RigidTransform(RollPitchYaw(arm.offset_rpy), arm.offset)
+    stand = RigidTransform(RollPitchYaw(mounting.base_rpy), mounting.base_position)
+    plant.WeldFrames(plant.world_frame(), plant.GetFrameByName(root, model), stand)
+    tip = plant.GetFrameByName(description.end_effector, model)
+    if np.any(mounting.offset) or np.any(mounting.offset_rpy):
+        tool = RigidTransform(RollPitchYaw(mounting.offset_rpy), mounting.offset)
         tip = plant.AddFrame(FixedOffsetFrame("end_effector_point", tip, tool, model))
-    if arm.payload > 0:
-        point = SpatialInertia(arm.payload, np.zeros(3), UnitInertia(0.0, 0.0, 0.0))
+    if mounting.payload > 0:
+        point = SpatialInertia(mounting.payload, np.zeros(3), UnitInertia(0.0, 0.0, 0.0))
         load = plant.AddRigidBody("payload", model, point)
         plant.WeldFrames(tip, load.body_frame())
     return model, tip
@@ -44,15 +40,14 @@ def assemble(arm: Arm, plant: Any, xml: str, base: str, parser: Any) -> tuple[An
 class Stack:
     """`size` copies of one arm in one plant, with a context of its own."""
 
-    def __init__(self, arm: Arm, size: int) -> None:
-        description = arm.description
+    def __init__(self, description: Description, mounting: Mounting, size: int) -> None:
         plant = MultibodyPlant(0.0)
-        plant.mutable_gravity_field().set_gravity_vector(arm.gravity)
+        plant.mutable_gravity_field().set_gravity_vector(mounting.gravity)
         parser = Parser(plant)
         parser.SetAutoRenaming(True)
         self.tips, joints = [], []
         for _ in range(size):
-            model, tip = assemble(arm, plant, *description.for_drake, parser)
+            model, tip = assemble(plant, parser, description, mounting)
             self.tips.append(tip)
             joints += [plant.GetJointByName(name, model) for name in description.joints]
         plant.Finalize()
@@ -64,7 +59,9 @@ class Stack:
         self.no_forces = MultibodyForces(plant)
         self.world = plant.world_frame()
         self.zero = np.zeros(size * self.n)
-        self.armature, self.has_gravity = arm.armature, bool(np.any(arm.gravity))
+        of_joints = mounting.rotors(len(description.actuated))
+        self.armature = np.concatenate([np.zeros(description.base_coordinates), of_joints])
+        self.has_gravity = bool(np.any(mounting.gravity))
 
     def at(self, q: Array, qd: Array | None = None) -> None:
         self.plant.SetPositions(self.context, q.ravel())

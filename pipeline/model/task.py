@@ -43,7 +43,7 @@ class PositionTask:
     @property
     def redundancy(self) -> int:
         """Redundancy degree r: the arm's joints less m."""
-        return self.arm.n - self.arm.base_coordinates - self.m
+        return self.arm.n - self.arm.base.count - self.m
 
     @property
     def rows(self) -> list[int]:
@@ -111,7 +111,7 @@ class PoseTask:
 
     @property
     def redundancy(self) -> int:
-        return self.arm.n - self.arm.base_coordinates - self.m
+        return self.arm.n - self.arm.base.count - self.m
 
     @property
     def rows(self) -> list[int]:

@@ -1,8 +1,9 @@
 """The part of an objective that depends on positions and velocities alone: L(q, qd) = 1/2 qd' G(q) qd - k0 w(q).
 
-G = a M(q) + 2 c I + 2 d S(q) for a times the kinetic energy, c times the squared norm of the joint velocities and d times
-that of a floating base's angular velocity: what the inertia matrix is to the kinetic energy, G is to L. Everything that solves such problems (transcription, dynamic programming,
-calculus of variations, maximum principle, predictions) takes G, w and their derivatives from here.
+G = a M(q) + 2 c I + 2 d S(q) for a times the kinetic energy, c times the squared norm of the joint velocities and d
+times that of a floating base's angular velocity: what the inertia matrix is to the kinetic energy, G is to L. All that
+solves such problems (transcription, dynamic programming, calculus of variations, maximum principle, predictions) takes
+G, w and their derivatives from here.
 """
 
 from __future__ import annotations
@@ -10,7 +11,6 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.common.arrays import Array
-from pipeline.model.base import FloatingArm
 from pipeline.model.task import Task
 from pipeline.problem.objective import Objective
 
@@ -20,10 +20,10 @@ class Lagrangian:
 
     def __init__(self, task: Task, objective: Objective) -> None:
         self.task, self.arm = task, task.arm
-        self.inertia, self.norm, self.secondary = objective.kinetic_energy, objective.velocity_norm, objective.secondary
-        self.rotation = objective.base_rotation
-        self._of_joints = np.ones(self.arm.n)
-        self._of_joints[: self.arm.base_coordinates] = 0.0
+        self.inertia, self.norm = objective.weight("kinetic_energy"), objective.weight("velocity_norm")
+        self.rotation, self.secondary = objective.weight("base_rotation"), objective.secondary
+        self._of_joints = np.zeros(self.arm.n)
+        self._of_joints[self.arm.joints] = 1.0
 
     @property
     def is_quadratic(self) -> bool:
@@ -36,12 +36,8 @@ class Lagrangian:
         if self.inertia:
             total += self.inertia * self.arm.mass_matrix(q)
         if self.rotation:
-            total += 2 * self.rotation * self._floating().turning_metric(q)
+            total += 2 * self.rotation * self.arm.base.turning_metric(q)
         return total
-
-    def _floating(self) -> FloatingArm:
-        assert isinstance(self.arm, FloatingArm)  # prepare.py refuses other arms
-        return self.arm
 
     def quadratic(self, q: Array, qd: Array) -> Array:
         """1/2 qd' G qd (K,)."""
@@ -49,7 +45,7 @@ class Lagrangian:
         if self.inertia:
             value = value + self.inertia * self.arm.kinetic_energy(q, qd)
         if self.rotation:
-            value = value + self.rotation * self._floating().turning(q, qd)[0]
+            value = value + self.rotation * self.arm.base.turning(q, qd)[0]
         return value
 
     def quadratic_gradient(self, q: Array, qd: Array) -> tuple[Array, Array, Array]:
@@ -64,7 +60,7 @@ class Lagrangian:
                 by_qd + self.inertia * momentum,
             )
         if self.rotation:
-            parts = zip((value, by_q, by_qd), self._floating().turning(q, qd), strict=True)
+            parts = zip((value, by_q, by_qd), self.arm.base.turning(q, qd), strict=True)
             value, by_q, by_qd = (total + self.rotation * part for total, part in parts)
         return value, by_q, by_qd
 

@@ -1,49 +1,41 @@
-"""What is minimised: a weighted sum of integrals, and bounds on them."""
+"""What is minimised: a weighted sum of integrals, less what a secondary criterion gains."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
+from pipeline.common.errors import InputError
+from pipeline.problem.integrals import ByIntegral, of_order
 from pipeline.problem.secondary import Secondary
 
 
 @dataclass(frozen=True)
 class Objective:
-    """A sum of integrals: weights of the kinetic energy, the squared joint torques and the squared joint velocities;
-    what `secondary` gains is taken off (Pontryagin report eq. (13) with the sign that maximises it).
+    """A sum of integrals by their names in the catalogue (`integrals.py`), `weights` in 1 over their units, as in
+    Objective({"kinetic_energy": 0.3, "torque": 0.7}).
 
-    Of the base: the squared angular velocity of one that floats; the squared force and torque on one that is held.
+    What `secondary` gains is taken off (Pontryagin report eq. (13) with the sign that maximises it). Weights of zero
+    are dropped. Raises InputError for an unknown name or a weight that is negative or not finite.
     """
 
-    kinetic_energy: float = 1.0
-    torque: float = 0.0
-    velocity_norm: float = 0.0
+    weights: Mapping[str, float] = field(default_factory=lambda: {"kinetic_energy": 1.0})
     secondary: Secondary | None = None
-    base_rotation: float = 0.0
-    reaction_force: float = 0.0
-    reaction_torque: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name, weight in self.weights.items():
+            if not (weight >= 0 and np.isfinite(weight)):
+                raise InputError(f"objective: the weight of {name} is {weight:g}; it must be finite and not negative")
+        counted = ByIntegral({name: weight for name, weight in self.weights.items() if weight})
+        object.__setattr__(self, "weights", counted)
+
+    def weight(self, name: str) -> float:
+        """Zero for integrals that do not count."""
+        return self.weights.get(name, 0.0)
 
     @property
     def second_order(self) -> bool:
         """Whether accelerations count."""
-        return self.torque > 0 or self.reaction_force > 0 or self.reaction_torque > 0
-
-
-INTEGRALS = ("kinetic_energy", "torque", "base_rotation", "reaction_force", "reaction_torque")
-
-
-@dataclass(frozen=True)
-class IntegralBounds:
-    """Upper bounds on the same integrals; infinite where there is none."""
-
-    kinetic_energy: float = np.inf
-    torque: float = np.inf
-    base_rotation: float = np.inf
-    reaction_force: float = np.inf
-    reaction_torque: float = np.inf
-
-    def bounds(self, *names: str) -> bool:
-        """Whether one of the integrals `names` is bounded."""
-        return any(np.isfinite(getattr(self, name)) for name in names)
+        return bool(of_order(self.weights, 2))

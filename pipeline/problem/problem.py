@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import enum
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from pipeline.common.arrays import Array
-from pipeline.model.clearance import Obstacles
+from pipeline.common.errors import InputError
+from pipeline.model.obstacles import Obstacles
 from pipeline.model.task import Task
 from pipeline.path.reference import Reference
+from pipeline.problem.integrals import ByIntegral
 from pipeline.problem.limits import Limits
-from pipeline.problem.objective import IntegralBounds, Objective
+from pipeline.problem.objective import Objective
 
 
 class Boundary(enum.Enum):
@@ -27,6 +30,7 @@ class Problem:
 
     q_init: (n,) [rad] the initial configuration (for boundary `free` and `cyclic`: the one that starts are drawn from).
     times: (N + 1,) [s] the knots of the grid on which a global solution is wanted.
+    bounds_of_integrals: upper bounds by the names in the catalogue (`integrals.py`), positive; an infinite one is none.
     qd_init: (n,) [rad/s] the velocity that a motion from q_init comes with; None: at rest, or as the path is entered.
     """
 
@@ -37,9 +41,16 @@ class Problem:
     objective: Objective = field(default_factory=Objective)
     limits: Limits | None = None
     boundary: Boundary = Boundary.FIXED
-    integral_bounds: IntegralBounds = field(default_factory=IntegralBounds)
+    bounds_of_integrals: Mapping[str, float] = field(default_factory=dict)
     obstacles: Obstacles | None = None
     qd_init: Array | None = None
+
+    def __post_init__(self) -> None:
+        for name, bound in self.bounds_of_integrals.items():
+            if not bound > 0:
+                raise InputError(f"the bound of the integral {name} is {bound:g}; it must be positive")
+        finite = ByIntegral({name: bound for name, bound in self.bounds_of_integrals.items() if bound < float("inf")})
+        object.__setattr__(self, "bounds_of_integrals", finite)
 
     @property
     def bounds(self) -> Limits:

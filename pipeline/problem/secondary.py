@@ -1,7 +1,7 @@
-"""Secondary criteria w(q), to be maximised along a motion: how far an arm is from singularities and from its joint limits.
+"""Secondary criteria w(q), to be maximised along a motion: how far an arm is from singularities and joint limits.
 
-Pontryagin report Section 6: eq. (14), the manipulability measure, and eq. (15), the distance from the joint limits, whose
-sum lacks the square that gives it its meaning (and the report its numbers). Gradients are exact.
+Pontryagin report Section 6: eq. (14), the manipulability measure, and eq. (15), the distance from the joint limits,
+whose sum lacks the square that gives it its meaning (and the report its numbers). Gradients are exact.
 """
 
 from __future__ import annotations

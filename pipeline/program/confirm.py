@@ -13,7 +13,7 @@ import numpy as np
 
 from pipeline.common.arrays import Array
 from pipeline.problem.problem import Problem
-from pipeline.program.program import Transcription
+from pipeline.program.transcription import transcribe
 
 HANDOVER = {
     "mu_init": 1e-10,
@@ -40,7 +40,7 @@ class Confirmation:
 
 def confirm(problem: Problem, times: Array, q: Array, *, tolerance: float, max_iterations: int) -> Confirmation:
     """IPOPT's own answer from q (N + 1, n)."""
-    final, outcome, iterations = Transcription(problem, times, q).solve(
+    final, outcome, iterations = transcribe(problem, times, q).solve(
         tolerance=tolerance, max_iterations=max_iterations, extra=HANDOVER
     )
     moved = float(np.abs(final - q).max())

@@ -53,7 +53,7 @@ class DifferentiableConstraint:
 
     @property
     def iterations(self) -> int:
-        """IPOPT's iterations since the last `forget`: one Jacobian each, after two at the start (one of them Drake's)."""
+        """IPOPT's iterations since `forget`: one Jacobian each, after two at the start (one of them Drake's)."""
         return max(0, self.linearisations - 2)
 
     def forget(self) -> None:

@@ -8,11 +8,11 @@ import numpy as np
 
 from pipeline.common.arrays import Array
 from pipeline.model.arm import Arm
-from pipeline.model.base import FloatingArm
-from pipeline.model.clearance import Clearance, Obstacles
+from pipeline.model.clearance import Clearance
+from pipeline.model.obstacles import Obstacles
 from pipeline.problem.costs import integrals, velocities
 from pipeline.problem.problem import Problem
-from pipeline.program.program import Transcription
+from pipeline.program.transcription import transcribe
 
 UNITS = {"position": "rad", "velocity": "rad/s", "torque": "N m", "power": "W", "clearance": "m", "attitude": "rad"}
 
@@ -33,8 +33,8 @@ class Violation:
         unit = UNITS[self.kind]
         percent = f"{100 * self.relative:.0f}" if self.relative > 0.1 else f"{100 * self.relative:.2g}"
         return (
-            f"no feasible motion: the {self.kind} limit of {self.joint} ({self.limit:.4g} {unit}) cannot be met; the least "
-            f"violation found is {percent} % ({self.reached:.4g} {unit} at t = {self.time:.3g} s)"
+            f"no feasible motion: the {self.kind} limit of {self.joint} ({self.limit:.4g} {unit}) cannot be met; the "
+            f"least violation found is {percent} % ({self.reached:.4g} {unit} at t = {self.time:.3g} s)"
         )
 
 
@@ -62,9 +62,9 @@ def violations(problem: Problem, times: Array, q: Array) -> list[Violation]:
 
 def _turned(problem: Problem, times: Array, q: Array) -> Violation | None:
     arm, bound = problem.task.arm, problem.bounds.attitude
-    if not np.isfinite(bound) or not isinstance(arm, FloatingArm):
+    if not np.isfinite(bound):
         return None
-    angle = np.arccos(np.clip(arm.attitude_cosine(q)[0], -1.0, 1.0))
+    angle = np.arccos(np.clip(arm.base.attitude_cosine(q)[0], -1.0, 1.0))
     knot = int(np.argmax(angle))
     return Violation(
         "attitude", "the base", bound, float(angle[knot]), float(times[knot]), float(angle[knot] / bound - 1)
@@ -106,8 +106,8 @@ class Relaxed:
 def least_violation(problem: Problem, times: Array, guesses: list[Array]) -> Relaxed | None:
     """The limit to blame: the kind that, given way alone, lets a motion exist with the least excess.
 
-    If no kind suffices alone, all give way together. None if no solve succeeds. A motion without any excess is feasible:
-    the way to it led through motions that are not, which other solves do not dare.
+    If no kind suffices alone, all give way together. None if no solve succeeds. A motion without any excess is
+    feasible: the way to it led through motions that are not, which other solves do not dare.
     """
     if not guesses:
         return None
@@ -127,7 +127,7 @@ def least_violation(problem: Problem, times: Array, guesses: list[Array]) -> Rel
 def _relaxed(problem: Problem, times: Array, guesses: list[Array], kinds: list[str]) -> Relaxed | None:
     best: Relaxed | None = None
     for guess in guesses:
-        q, outcome, _ = Transcription(problem, times, guess, elastic=kinds).solve(tolerance=1e-6, max_iterations=150)
+        q, outcome, _ = transcribe(problem, times, guess, elastic=kinds).solve(tolerance=1e-6, max_iterations=150)
         gap = np.abs(problem.task.error(q, problem.reference.position(times))).max()
         if not outcome.converged or gap > 1e-6:
             continue

@@ -20,7 +20,7 @@ CONVERGED = ("success", "stop at acceptable point")
 
 @dataclass(frozen=True)
 class Outcome:
-    """x: the final decision vector. converged: IPOPT's conditions hold, to its tolerance or at worst to 1e-6 (see status)."""
+    """x: the final decision vector. converged: IPOPT's conditions hold, to its tolerance or at worst 1e-6 (status)."""
 
     x: Array
     converged: bool

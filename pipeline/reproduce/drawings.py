@@ -10,10 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from pipeline.artifacts import style
-from pipeline.artifacts.figures import candidates, motions
-from pipeline.artifacts.figures import front as front_figure
-from pipeline.artifacts.figures import identification as identification_figure
+from pipeline.artifacts.figures import motions
 from pipeline.artifacts.figures.panels import EVENT, INK
 from pipeline.artifacts.figures.stroboscopic import stroboscopic
 from pipeline.common.arrays import Array
@@ -21,7 +18,9 @@ from pipeline.config import documents
 from pipeline.evaluation.evaluation import Evaluation
 from pipeline.reproduce.recompute import recompute
 from pipeline.reproduce.results import Results
-from pipeline.studies.candidates import Study
+from pipeline.studies import style
+from pipeline.studies.candidates import Candidates
+from pipeline.studies.front import Front
 from pipeline.studies.identification import Identification
 
 FIGURES = {
@@ -126,19 +125,19 @@ def candidate_study(runs: Sequence[Results], labels: Sequence[str], title: str) 
         recompute(documents.PowerLaw(run.name, parameter), {run.name: run}) for parameter in ("intercept", "exponent")
     )
     parameters = len(problem.times) * problem.task.arm.n
-    study = Study(curve["candidates"].to_numpy(), curve["distance"].to_numpy(), parameters, intercept, exponent)
-    return candidates.draw(study, title)
+    found = Candidates(curve["candidates"].to_numpy(), curve["distance"].to_numpy(), parameters, intercept, exponent)
+    return found.figures(title)["candidate_study"]
 
 
 def front(runs: Sequence[Results], labels: Sequence[str], title: str) -> Figure:
     """The Pareto front."""
-    return front_figure.draw(runs[0].table("front"), title)
+    return Front(runs[0].table("front")).figures(title)["front"]
 
 
 def identification(runs: Sequence[Results], labels: Sequence[str], title: str) -> Figure:
     """The residuals of every printed number under the printed and the identified masses."""
     found = Identification(runs[0].table("masses"), runs[0].table("identification"))
-    return identification_figure.draw(found, title)
+    return found.figures(title)["identification"]
 
 
 DRAW: dict[str, Draw] = {

@@ -1,4 +1,4 @@
-"""What the runs give for a printed number: one function per kind of `documents.NUMBERS`."""
+"""What the runs give for a printed number: one function per kind of number in `documents`."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Runs = Mapping[str, Results]
 
 def recompute(found: Any, runs: Runs) -> float:
     """The number that `found` describes; raises ResultError if the runs do not hold it."""
-    for name in documents.experiments(found):
+    for name in found.experiments:
         if name not in runs:
             raise ResultError(f"no run of experiment {name}")
     return float(_value(found, runs))

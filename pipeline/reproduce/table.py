@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-from pipeline.config.documents import Document, Row, experiments
+from pipeline.config.documents import Document, Row
 from pipeline.reproduce.recompute import Runs, recompute
 from pipeline.reproduce.results import ResultError
 from pipeline.reproduce.verdict import VERDICTS, verdict
@@ -35,7 +35,7 @@ def judge(row: Row, value: float) -> str:
 
 def command(row: Row) -> str:
     """The command line whose results hold the number."""
-    names = experiments(row.found)
+    names = row.found.experiments
     return f"python -m pipeline {'-m ' if len(names) > 1 else ''}+experiment={','.join(names)}"
 
 

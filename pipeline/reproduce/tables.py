@@ -8,8 +8,8 @@ from typing import Any
 
 import pandas as pd
 
-from pipeline.artifacts.markdown import markdown_table
 from pipeline.common.files import write_beside
+from pipeline.common.markdown import markdown_table
 from pipeline.config.documents import Document
 from pipeline.reproduce.table import counts
 

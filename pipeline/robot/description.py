@@ -22,7 +22,7 @@ class Description:
     lower, upper: (n,) position limits [rad or m]. velocity: (n,) [rad/s or m/s]. effort: (n,) [N m or N].
     A limit that the file does not state is infinite. collision: primitive shapes of links. meshes: links that have
     collision meshes instead, which are not used. pictures: file names of visual meshes.
-    base_coordinates: how many of the joints, the first ones, are not the arm's but move its base (`floating.py`), and
+    base_coordinates: how many of the joints, the first ones, are not the arm's but move its base (`spacecraft.py`), and
     root: the link of the xml that they start from.
     """
 

@@ -1,4 +1,4 @@
-"""The body that a floating arm is bolted to, and the description with the base's own coordinates before the joints."""
+"""The body that a moving base carries, and the description with the base's own coordinates before the joints."""
 
 from __future__ import annotations
 
@@ -9,9 +9,6 @@ import numpy as np
 
 from pipeline.robot.description import Description
 
-PLANAR, SPATIAL = ("x", "y", "yaw"), ("x", "y", "z", "yaw", "pitch", "roll")
-
-
 AXIS = {"x": "1 0 0", "y": "0 1 0", "z": "0 0 1", "yaw": "0 0 1", "pitch": "0 1 0", "roll": "1 0 0"}
 
 
@@ -21,18 +18,20 @@ class Spacecraft:
 
     mass [kg], inertia (3, 3) about its centre of mass com (3,) [m], all in the frame of the root link.
     momentum (6,): linear [N s], then angular [N m s] about the place where the root link starts, of the whole system in
-    the world. held: whether it stands still instead of floating.
+    the world.
     """
 
     mass: float = 0.0
     inertia: tuple[tuple[float, ...], ...] = ((0.0,) * 3,) * 3
     com: tuple[float, ...] = (0.0, 0.0, 0.0)
     momentum: tuple[float, ...] = (0.0,) * 6
-    held: bool = False
 
 
-def floating(description: Description, spacecraft: Spacecraft, names: tuple[str, ...]) -> Description:
-    """The description with a massless chain of joints `names` before its root link, and the spacecraft bolted to that."""
+def on_moving_base(description: Description, spacecraft: Spacecraft, names: tuple[str, ...]) -> Description:
+    """The description with a massless chain of joints before its root link, and the spacecraft bolted to that link.
+
+    names: of the coordinates that the chain gives the base, in order, out of x, y, z [m], yaw, pitch, roll [rad].
+    """
     robot = ET.fromstring(description.xml)
     taken = {element.get("name", "") for element in robot}
     prefix = "base"

@@ -5,14 +5,15 @@ from __future__ import annotations
 import sys
 import uuid
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from hydra.experimental.callback import Callback
 from omegaconf import DictConfig
 
 from pipeline.common.errors import InputError
-from pipeline.config.compose import checked
-from pipeline.config.run import RunConfig
+
+if TYPE_CHECKING:
+    from pipeline.config.run import RunConfig
 
 MARK = ".sweep"  # in a run's folder: which start of a sweep it belongs to
 
@@ -28,6 +29,8 @@ class Session(Callback):
 
     def on_run_start(self, config: DictConfig, **_: Any) -> None:
         """Refuse bad input before Hydra makes the output folder."""
+        from pipeline.config.compose import checked
+
         try:
             self.check(checked(config))
         except InputError as error:
@@ -35,11 +38,11 @@ class Session(Callback):
             raise SystemExit(2) from None
 
     def check(self, asked: RunConfig) -> None:
-        """Raise InputError if the job cannot be done."""
+        """Raise InputError if the job cannot be done. The problem that is built for this is kept for the run."""
         from pipeline.common.workers import Workers
-        from pipeline.run.solve import state
+        from pipeline.run.state import keep
 
-        state(asked)
+        keep(asked)
         Workers(address=asked.parallel.address).check()
 
     def on_multirun_start(self, config: DictConfig, **_: Any) -> None:

@@ -9,7 +9,6 @@ from scipy.stats import qmc
 
 from pipeline.common.arrays import Array
 from pipeline.common.errors import InputError
-from pipeline.model.base import FloatingArm
 from pipeline.model.kinematics import wrap, wrap_angles
 from pipeline.model.task import Task
 from pipeline.problem.problem import Boundary, Problem
@@ -21,10 +20,8 @@ def starting_points(problem: Problem, count: int, rng: np.random.Generator, draw
     if problem.boundary is Boundary.FIXED:
         return problem.q_init[None]
     arm, q_init = problem.task.arm, problem.q_init
-    if not isinstance(arm, FloatingArm):
-        return random_configurations(problem.task, q_init, count, rng, draw)
     # Before the motion begins the base stands where it stands.
-    nb = arm.base_coordinates
+    nb = arm.base.count
     found = random_configurations(replace(problem.task, arm=arm.on_fixed_base), q_init[nb:], count, rng, draw)
     return np.hstack([np.tile(q_init[:nb], (len(found), 1)), found])
 

@@ -31,9 +31,9 @@ class Manifold:
         # Only joints without limits come round again.
         turning = problem.task.arm.description.revolute & np.isinf(bounds.lower) & np.isinf(bounds.upper)
         self.period = np.where(turning, 2 * np.pi, 0.0)
-        first_order = objective.kinetic_energy > 0 or objective.velocity_norm > 0
-        self.inertia = objective.kinetic_energy if first_order else 1.0
-        self.norm = objective.velocity_norm
+        self.inertia, self.norm = objective.weight("kinetic_energy"), objective.weight("velocity_norm")
+        if not self.inertia and not self.norm:
+            self.inertia = 1.0
         self.clearance = None if problem.obstacles is None else Clearance(problem.task.arm, problem.obstacles)
 
     def wrap(self, difference: Array) -> Array:

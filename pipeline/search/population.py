@@ -33,7 +33,7 @@ def population(problem: Problem, times: Array, starts: Array, count: int, rng: n
     x_ref = problem.reference.position(times)
     which = np.arange(count) % len(starts)
     turn = np.arange(count) // len(starts)
-    joints = arm.n - arm.base_coordinates
+    joints = arm.n - arm.base.count
     constant = random_inverse_weights(rng, count, joints)
     constant[turn == 1] = np.eye(joints)
     motions: Array = np.empty((count, len(times), arm.n))
@@ -63,11 +63,11 @@ def _close(problem: Problem, times: Array, motions: Array) -> Array:
     """Spread the gap between end and start of each motion over its knots, and put the knots back on the path."""
     arm = problem.task.arm
     gap = wrap(motions[:, -1] - motions[:, 0], arm.description.revolute)
-    gap[:, : arm.base_coordinates] = 0.0
+    gap[:, : arm.base.count] = 0.0
     ramp = np.linspace(0.0, 1.0, len(times))[:, None]
     # A motion that comes back wound by a full turn is not closed by this; it stays as it is and its gap decides.
     moved = motions - ramp * gap[:, None, :]
-    if arm.base_coordinates:
+    if arm.base.count:
         return _refloat(arm, times, moved)
     count, knots, n = moved.shape
     target = np.tile(problem.reference.position(times), (count, 1))
@@ -83,7 +83,7 @@ def _refloat(arm: Arm, times: Array, motions: Array) -> Array:
     for i in range(1, len(times)):
         step = motions[:, i] - motions[:, i - 1]
         middle = out[:, i - 1].copy()
-        middle[:, arm.base_coordinates :] = (motions[:, i] + motions[:, i - 1])[:, arm.base_coordinates :] / 2
+        middle[:, arm.joints] = (motions[:, i] + motions[:, i - 1])[:, arm.joints] / 2
         out[:, i] = out[:, i - 1] + arm.follow(middle, step / (times[i] - times[i - 1])) * (times[i] - times[i - 1])
     return out
 

@@ -2,49 +2,61 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import ClassVar
 
 from scipy.interpolate import CubicSpline
 
 from pipeline.problem.costs import objective_values
 from pipeline.problem.problem import Problem
-from pipeline.problem.solution import Solution, Status
-from pipeline.program.program import Transcription
+from pipeline.problem.solution import Solution
+from pipeline.program.transcription import transcribe
+from pipeline.studies.study import Motions, Result
 
 
-def certify(problem: Problem, optimum: Solution, grid_optimum: Solution) -> dict[str, float]:
-    """The planner's optimum carried to the knots of the dynamic programming, where both minimise the same sum.
-
-    planner_on_grid [J s]: its cost there. gap: the grid's cost less that; the grid's paths are feasible there, so a gap
-    below zero would show a better motion than the planner's. grid_error: by how much the grid's cost may be too high.
+@dataclass(frozen=True)
+class Certificate(Result):
+    """planner_on_grid [J s]: the planner's cost on the grid of so many intervals. gap: the grid's own cost less that;
+    its paths are feasible there, so a gap below zero would show a better motion than the planner's. grid_error: by how
+    much the grid's cost may be too high.
     """
+
+    name: ClassVar[str] = "certificate"
+    planner_on_grid: float
+    gap: float
+    grid_error: float
+    intervals: int
+
+    @property
+    def sentence(self) -> str:
+        """The certificate for people."""
+        verdict = "beyond the grid error: look closer"
+        if 0 <= self.gap <= self.grid_error:
+            verdict = "no better motion exists on this grid"
+        if self.gap < 0:
+            verdict = "the grid holds a better motion than the planner found"
+        return (
+            f"on {self.intervals} intervals the planner's best costs {self.planner_on_grid:.5g}, the dynamic "
+            f"programming's {self.planner_on_grid + self.gap:.5g} with a grid error of {self.grid_error:.2g}: {verdict}"
+        )
+
+    def section(self) -> list[str]:
+        return [f"Certificate: {self.sentence}."]
+
+
+def study(motions: Motions) -> Certificate | None:
+    """Where both methods were asked for and found a motion."""
+    optimum, on_grid = motions.best("global"), motions.best("dynamic_programming")
+    if optimum is None or on_grid is None:
+        return None
+    return certify(motions.problem, optimum.solution, on_grid.solution)
+
+
+def certify(problem: Problem, optimum: Solution, grid_optimum: Solution) -> Certificate:
+    """The planner's optimum carried to the knots of the dynamic programming, where both minimise the same sum."""
     times = grid_optimum.trajectory.time
     guess = CubicSpline(optimum.trajectory.time, optimum.trajectory.q)(times)
-    q, outcome, _ = Transcription(replace(problem, times=times), times, guess).solve()
+    q, outcome, _ = transcribe(replace(problem, times=times), times, guess).solve()
     cost = float(objective_values(problem, times, q[None])[0]) if outcome.converged else float("nan")
-    grid_cost = float(grid_optimum.statistics["cost"])
-    return {
-        "planner_on_grid": cost,
-        "gap": grid_cost - cost,
-        "grid_error": float(grid_optimum.statistics["grid_error"]),
-    }
-
-
-def sentence(certificate: dict[str, float], intervals: int) -> str:
-    """The certificate for people."""
-    gap, error = certificate["gap"], certificate["grid_error"]
-    verdict = "no better motion exists on this grid" if 0 <= gap <= error else "beyond the grid error: look closer"
-    if gap < 0:
-        verdict = "the grid holds a better motion than the planner found"
-    return (
-        f"on {intervals} intervals the planner's best costs {certificate['planner_on_grid']:.5g}, the dynamic programming's "
-        f"{certificate['planner_on_grid'] + gap:.5g} with a grid error of {error:.2g}: {verdict}"
-    )
-
-
-def comparable(solutions: list[Solution]) -> tuple[Solution, Solution] | None:
-    """The best optimum of both methods, where both were asked for and found one."""
-    first = {solution.method: solution for solution in reversed(solutions) if solution.status is Status.SOLVED}
-    if "global" in first and "dynamic_programming" in first:
-        return first["global"], first["dynamic_programming"]
-    return None
+    gap = float(grid_optimum.statistics["cost"]) - cost
+    return Certificate(cost, gap, float(grid_optimum.statistics["grid_error"]), len(times) - 1)

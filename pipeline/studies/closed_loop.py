@@ -1,15 +1,18 @@
 """Does the motion work on a controlled arm? Drake's Simulator follows it with an inverse-dynamics controller.
 
-tau = M(q) (qdd_ref + kd (qd_ref - qd) + kp (q_ref - q)) + n(q, qd) - g(q) (computed torque; Siciliano et al. 2009, 8.5.2), held
-between the controller's samples and cut off at the effort limits. Gains: kp = w^2, kd = 2 zeta w.
+tau = M(q) (qdd_ref + kd (qd_ref - qd) + kp (q_ref - q)) + n(q, qd) - g(q) (computed torque; Siciliano et al. 2009,
+8.5.2), held between the controller's samples and cut off at the effort limits. Gains: kp = w^2, kd = 2 zeta w.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import BodyIndex, SpatialInertia
@@ -25,27 +28,29 @@ from pipeline.evaluation.evaluation import Evaluation
 from pipeline.model.arm import Arm
 from pipeline.model.stack import assemble
 from pipeline.problem.problem import Problem
-from pipeline.studies.export import curve
+from pipeline.studies import style
+from pipeline.studies.export import chosen, curve
+from pipeline.studies.study import Motions, Result
 
 DIVERGED = 3.0  # [rad] of a joint from its reference: the simulation is stopped
-
-
 ACCURACY = 1e-6
-
-
 SATURATED = 1e-9  # relative
+POINTS = 2000  # most per line of the figure
 
 
 @dataclass(frozen=True)
-class ClosedLoop:
+class ClosedLoop(Result):
     """One simulation, at the controller's samples time (K,) [s].
 
     joint_error (K, n) [rad], end_effector_error (K,) [m] from the path, tau (K, n) [N m] as applied, saturated (K, n).
     effort (n,) [N m]: the limits. diverged: when the simulation was stopped, or None.
     """
 
+    name: ClassVar[str] = "closed_loop"
+    units: ClassVar[Mapping[str, str]] = {"closed_loop_joint_error": "rad", "closed_loop_tracking_error": "m"}
     method: str
     optimum: int
+    joints: tuple[str, ...]
     time: Array
     joint_error: Array
     end_effector_error: Array
@@ -66,12 +71,45 @@ class ClosedLoop:
     @property
     def sentence(self) -> str:
         joint, tip = np.abs(self.joint_error).max(), self.end_effector_error.max()
-        text = f"{self.method} {self.optimum}: followed to {joint:.2g} rad at the joints and {tip:.2g} m at the end effector"
+        text = f"followed to {joint:.2g} rad at the joints and {tip:.2g} m at the end effector"
         if self.diverged is not None:
-            text = f"{self.method} {self.optimum}: the controller lost the motion at t = {self.diverged:.3g} s"
+            text = f"the controller lost the motion at t = {self.diverged:.3g} s"
+        text = f"{self.method} {self.optimum}: {text}"
         if not np.isfinite(self.effort).any():
             return f"{text}; the arm states no effort limits"
         return f"{text}; a joint was at its effort limit for {100 * self.saturation:.2g} % of the time"
+
+    def section(self) -> list[str]:
+        return [f"Closed loop: {self.sentence}."]
+
+    def columns(self, motion: Evaluation) -> Mapping[str, Any]:
+        if (motion.method, motion.solution.optimum) != (self.method, self.optimum):
+            return {}
+        return {
+            "closed_loop_joint_error": np.abs(self.joint_error).max(),
+            "closed_loop_tracking_error": self.end_effector_error.max(),
+            "closed_loop_saturation": self.saturation,
+        }
+
+    def facts(self) -> Mapping[str, Any]:
+        return {
+            "method": self.method,
+            "optimum": self.optimum,
+            "joint_error": float(np.abs(self.joint_error).max()),
+            "tracking_error": float(self.end_effector_error.max()),
+            "saturation": self.saturation,
+            "peak_torque_over_limit": np.abs(self.tau).max(axis=0) / self.effort,
+            "diverged": self.diverged,
+        }
+
+    def figures(self, title: str) -> Mapping[str, Figure]:
+        return {"closed_loop": draw(self, title)}
+
+
+def study(motions: Motions) -> ClosedLoop | None:
+    """Where it is asked for and there is a motion to export."""
+    config, motion = motions.config.closed_loop, chosen(motions)
+    return None if motion is None or not config.run else simulate(motions.problem, motion, config)
 
 
 def effort_limits(problem: Problem) -> Array:
@@ -135,6 +173,7 @@ def simulate(problem: Problem, evaluation: Evaluation, options: ClosedLoopConfig
     return ClosedLoop(
         evaluation.method,
         evaluation.solution.optimum,
+        arm.description.joints,
         time,
         state[:, :n] - spline(time),
         np.linalg.norm(tip, axis=1),
@@ -148,10 +187,9 @@ def simulate(problem: Problem, evaluation: Evaluation, options: ClosedLoopConfig
 def _plant(arm: Arm) -> Any:
     """The arm with one motor per joint."""
     plant = MultibodyPlant(0.0)
-    xml, root = arm.description.for_drake
-    model, _ = assemble(arm, plant, xml, root, Parser(plant))
-    plant.mutable_gravity_field().set_gravity_vector(arm.gravity)
-    for name, rotor in zip(arm.description.joints, arm.armature, strict=True):
+    model, _ = assemble(plant, Parser(plant), arm.description, arm.mounting)
+    plant.mutable_gravity_field().set_gravity_vector(arm.mounting.gravity)
+    for name, rotor in zip(arm.description.joints, arm.mounting.rotors(arm.n), strict=True):
         motor = plant.AddJointActuator(name, plant.GetJointByName(name, model))
         motor.set_default_rotor_inertia(rotor)
     plant.Finalize()
@@ -168,3 +206,38 @@ def _heavier(plant: Any, factor: float) -> Any:
             scaled = SpatialInertia(inertia.get_mass() * factor, inertia.get_com(), inertia.get_unit_inertia())
             body.SetSpatialInertiaInBodyFrame(context, scaled)
     return context
+
+
+def draw(loop: ClosedLoop, title: str) -> Figure:
+    """Joint and end-effector errors, and torques relative to their limits (in N m without any); saturation shaded."""
+    figure = Figure(figsize=(9.0, 7.5), layout="constrained")
+    FigureCanvasAgg(figure)
+    panels = figure.subplots(3, 1, sharex=True)
+    thin = slice(None, None, max(1, len(loop.time) // POINTS))
+    time = loop.time[thin]
+    limited = bool(np.isfinite(loop.effort).all())
+    torques = loop.wanted[thin] / loop.effort if limited else loop.wanted[thin]
+    for j, joint in enumerate(loop.joints):
+        color = style.joint_color(j)
+        panels[0].plot(time, loop.joint_error[thin, j], color=color, linewidth=1.3, label=joint)
+        panels[2].plot(time, torques[:, j], color=color, linewidth=1.3)
+    panels[1].plot(time, loop.end_effector_error[thin], color=style.color(loop.method), linewidth=1.5)
+    if limited:
+        for bound in (-1.0, 1.0):
+            panels[2].axhline(bound, color="#C53030", linestyle=(0, (4, 3)), linewidth=1.0)
+    for axes in panels:
+        axes.fill_between(
+            time, 0, 1, where=loop.saturated.any(axis=1)[thin], transform=axes.get_xaxis_transform(), color="#F6D5D5"
+        )
+        axes.grid(color="#E2E8F0", linewidth=0.7)
+        axes.set_axisbelow(True)
+        axes.spines[["top", "right"]].set_visible(False)
+    panels[0].set_ylabel("Joint error [rad]")
+    panels[1].set_ylabel("End-effector error [m]")
+    panels[2].set_ylabel("Wanted torque / limit" if limited else "Torque [N m]")
+    panels[2].set_xlabel("Time [s]; shaded: a joint is at its effort limit")
+    figure.legend(
+        *panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=7, fontsize=8, frameon=False
+    )
+    figure.suptitle(f"{title}: closed loop, {style.name(loop.method)}", fontweight="bold")
+    return figure

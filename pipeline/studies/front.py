@@ -2,26 +2,79 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 import pandas as pd
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
 
 from pipeline.common.arrays import Array
+from pipeline.common.markdown import cells, markdown_table
 from pipeline.evaluation.evaluation import Evaluation
+from pipeline.problem.integrals import INTEGRALS
+from pipeline.studies import style
+from pipeline.studies.study import Motions, Result
 
 EQUAL = 1e-6  # relative: costs closer than this are the same
+FEW = 4  # motions between the extremes that figures show one by one
 
 
-def table(evaluations: Sequence[Evaluation]) -> pd.DataFrame | None:
+@dataclass(frozen=True)
+class Front(Result):
+    """table: one row per point, see `table`."""
+
+    name: ClassVar[str] = "front"
+    cover: ClassVar[str] = "front"
+    table: pd.DataFrame
+
+    @property
+    def good(self) -> pd.DataFrame:
+        """The points that nothing dominates."""
+        return self.table[self.table["status"] == "optimal"]
+
+    @property
+    def objectives(self) -> list[str]:
+        """The two integrals that are traded, in the order of the table's columns."""
+        return [column for column in self.table.columns if column in INTEGRALS]
+
+    @property
+    def share(self) -> float:
+        """The hypervolume."""
+        return hypervolume(self.good[self.objectives].to_numpy())
+
+    def tables(self) -> Mapping[str, pd.DataFrame]:
+        return {"front": self.table}
+
+    def section(self) -> list[str]:
+        head = f"Hypervolume {self.share:.4f} of the rectangle between the extremes."
+        return ["## Pareto front", "", head, "", *markdown_table(cells(self.table.drop(columns=["solver_status"])))]
+
+    def figures(self, title: str) -> Mapping[str, Figure]:
+        return {"front": draw(self, title)}
+
+    def hides(self, motion: Evaluation) -> bool:
+        """Of a front its extremes, its knee and a few points between them are shown."""
+        good = self.good
+        shown = set(good[good["extreme"] | good["knee"]]["point"]) | set(
+            good["point"].iloc[:: max(1, len(good) // FEW)]
+        )
+        return motion.method == "pareto" and motion.solution.optimum not in shown
+
+
+def study(motions: Motions) -> Front | None:
+    """Where a front was asked for and found."""
+    points = motions.confirmed("pareto")
+    return Front(table(points)) if points and "front" in points[0].solution.statistics else None
+
+
+def table(front: Sequence[Evaluation]) -> pd.DataFrame:
     """One row per point: status (optimal, dominated, infeasible, failed), path class, bound, verified costs, knee.
 
-    None if the run has no front. The costs are the evaluation's; `bound_excess` is how far the bounded one is above its
-    bound, relative.
+    The costs are the evaluation's; `bound_excess` is how far the bounded one is above its bound, relative.
     """
-    front = [e for e in evaluations if e.method == "pareto" and e.confirmed]
-    if not front or "front" not in front[0].solution.statistics:
-        return None
     statistics = front[0].solution.statistics
     rows = pd.DataFrame(statistics["front"])
     names = statistics["objectives"]
@@ -83,3 +136,54 @@ def hypervolume(values: Array) -> float:
     scaled = scaled[np.argsort(scaled[:, 0])]
     right = np.append(scaled[1:, 0], 1.0)
     return float(((right - scaled[:, 0]) * (1 - np.minimum.accumulate(scaled[:, 1]))).sum())
+
+
+def draw(front: Front, name: str) -> Figure:
+    """Both axes labelled, extremes and knee marked, classes by colour, dominated points apart."""
+    (x, y), good, table = front.objectives, front.good.sort_values(front.objectives[0]), front.table
+    figure = Figure(figsize=(7.4, 5.4), layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.add_subplot()
+    axes.step(good[x], good[y], where="post", color="0.8", linewidth=1.0, zorder=1, label="dominated region's edge")
+    for number in range(1, int(good["path_class"].max()) + 1):
+        points = good[good["path_class"] == number]
+        for bounded, marker in ((y, "o"), (x, "s"), ("", "D")):
+            some = points[points["bounded"] == bounded]
+            if some.empty:
+                continue
+            bound = {y: f"{y.replace('_', ' ')} bounded", x: f"{x.replace('_', ' ')} bounded", "": "unbounded"}[bounded]
+            axes.plot(
+                some[x],
+                some[y],
+                marker,
+                color=style.joint_color(number - 1),
+                markersize=6,
+                label=f"path class {number}, {bound}",
+            )
+    apart = table[table["status"] == "dominated"]
+    if not apart.empty:
+        axes.plot(apart[x], apart[y], "x", color="0.55", label="dominated")
+    for row in good[good["extreme"]].to_dict("records"):
+        left = row[x] > good[x].mean()
+        shift = (-8 if left else 8, 9)
+        side = "right" if left else "left"
+        axes.annotate("extreme", (row[x], row[y]), xytext=shift, textcoords="offset points", fontsize=9, ha=side)
+        axes.plot(row[x], row[y], "o", markersize=13, markerfacecolor="none", color="0.2")
+    for row in good[good["knee"]].to_dict("records"):
+        axes.annotate(
+            "knee",
+            (row[x], row[y]),
+            xytext=(10, 10),
+            textcoords="offset points",
+            fontsize=9,
+            arrowprops={"arrowstyle": "->"},
+        )
+    axes.set(
+        xlabel=f"{INTEGRALS[x].label} [{INTEGRALS[x].unit}]",
+        ylabel=f"{INTEGRALS[y].label} [{INTEGRALS[y].unit}]",
+        title=f"{name}: Pareto front, hypervolume {front.share:.3f} of the extremes' rectangle",
+    )
+    axes.grid(True, color="0.93")
+    axes.set_axisbelow(True)
+    axes.legend(fontsize=9)
+    return figure

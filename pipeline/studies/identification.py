@@ -10,19 +10,22 @@ Quadratures are the documents' (`costs.py`): backward differences on their own g
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import pandas as pd
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
 from scipy.optimize import least_squares
 from scipy.stats import t as student
 
 from pipeline.build.problem import prepare
 from pipeline.common.arrays import Array
 from pipeline.common.errors import ConfigError
+from pipeline.common.markdown import cells, markdown_table
 from pipeline.common.workers import Workers
 from pipeline.config import documents
 from pipeline.config.compose import experiment
@@ -35,21 +38,15 @@ from pipeline.model.arm import Arm
 from pipeline.model.task import PositionTask
 from pipeline.problem.costs import integrals, velocities
 from pipeline.problem.problem import Problem
-from pipeline.program.program import Transcription
+from pipeline.program.transcription import transcribe
 from pipeline.robot.description import Description
+from pipeline.studies import style
+from pipeline.studies.study import Motions, Result
 
 FEW = GlobalOptions(candidates=200, optimised=12)  # starts that find every optimum that is printed
-
-
 ROUNDS = 5  # of fits, at most, each from the optima at the masses of the one before
-
-
 SETTLED = 1e-4  # relative: masses that change less are found
-
-
 STEP = 1e-3  # relative, of the differences by the masses
-
-
 Key = tuple[str, str, int]  # experiment, method, optimum: one motion
 
 
@@ -60,10 +57,11 @@ class Printed:
     document: str
     place: str
     row: documents.Row
+    found: documents.Summary
 
     @property
     def motion(self) -> Key:
-        return self.row.found.experiment, self.row.found.method, self.row.found.optimum
+        return self.found.experiment, self.found.method, self.found.optimum
 
     @property
     def value(self) -> float:
@@ -79,17 +77,38 @@ class Printed:
 
 
 @dataclass(frozen=True)
-class Identification:
+class Identification(Result):
     """masses: link, printed, identified, and the bounds low and high of the confidence interval [kg].
 
     numbers: a row per printed number, with what both sets of masses give and the residuals in units of the rounding.
     """
 
+    name: ClassVar[str] = "identification"
     masses: pd.DataFrame
     numbers: pd.DataFrame
     confidence: float = 0.95
     rounds: int = 0
     evaluations: int = 0
+
+    def tables(self) -> Mapping[str, pd.DataFrame]:
+        return {"masses": self.masses, "identification": self.numbers}
+
+    def section(self) -> list[str]:
+        lines = [f"## Masses [kg], with intervals of {self.confidence:.0%} confidence", ""]
+        lines += markdown_table(cells(self.masses))
+        lines += ["", "## What the printed and the identified masses give (residuals in units of the rounding)", ""]
+        return lines + markdown_table(cells(self.numbers))
+
+    def figures(self, title: str) -> Mapping[str, Figure]:
+        return {"identification": draw(self, title)}
+
+
+def study(motions: Motions) -> Identification | None:
+    """Where it is asked for. Its many small results are not worth keeping for a resumed run."""
+    config = motions.config
+    if not config.identification.run:
+        return None
+    return identify(motions.problem.task.arm, config.identification, config.seed, replace(motions.workers, store=None))
 
 
 def identify(arm: Arm, config: IdentificationConfig, seed: int, workers: Workers) -> Identification:
@@ -111,7 +130,7 @@ def identify(arm: Arm, config: IdentificationConfig, seed: int, workers: Workers
         def residuals(unknowns: Array, motions: dict[Any, Array] = motions) -> Array:
             moved = _follow(motions, unknowns, workers)
             motions.update({key: q for key, (q, _) in moved.items()})
-            found = [moved[entry.motion][1][entry.row.found.column] for entry in fitted]
+            found = [moved[entry.motion][1][entry.found.column] for entry in fitted]
             return (np.array(found) - target) / sigma
 
         fit = least_squares(residuals, masses, method="lm", x_scale=start, diff_step=STEP, xtol=1e-6)
@@ -142,11 +161,12 @@ def masses_of(description: Description) -> Array:
 
 
 def with_masses(arm: Arm, masses: Array) -> Arm:
-    """The same arm with other masses (n,) [kg]; lengths, centres of gravity and moments of inertia stay."""
-    root, elements = _mass_elements(arm.description)
+    """The same arm with other masses [kg] (joints,); all else of its links, its mounting and its base stay."""
+    description = arm.on_fixed_base.description
+    root, elements = _mass_elements(description)
     for element, mass in zip(elements, masses, strict=True):
         element.set("value", repr(float(mass)))
-    return Arm(replace(arm.description, xml=ET.tostring(root, encoding="unicode")), tuple(arm.offset))
+    return Arm(replace(description, xml=ET.tostring(root, encoding="unicode")), arm.mounting, arm.base)
 
 
 def _mass_elements(description: Description) -> tuple[ET.Element, list[ET.Element]]:
@@ -172,7 +192,7 @@ def _printed(config: IdentificationConfig) -> list[Printed]:
                 continue
             if not isinstance(row.found, documents.Summary) or row.between is not None:
                 raise ConfigError(f"{name}, {place.place}, {row.quantity}: masses need a number of summary.csv")
-            found.append(Printed(name, place.place, row))
+            found.append(Printed(name, place.place, row, row.found))
     return found
 
 
@@ -218,7 +238,7 @@ def _moved(masses: Array, item: tuple[str, str, int, Array]) -> tuple[Array, dic
     name, method, _, q = item
     problem = _problem(name, masses)
     if method == "global":
-        q = Transcription(problem, problem.times, q).solve(tolerance=1e-8, max_iterations=200)[0]
+        q = transcribe(problem, problem.times, q).solve(tolerance=1e-8, max_iterations=200)[0]
     return q, quantities(problem, q)
 
 
@@ -228,8 +248,8 @@ def quantities(problem: Problem, q: Array) -> dict[str, float]:
     costs, qd = integrals(problem, times, q), velocities(problem, times, q)
     radius = np.linalg.eigvalsh(problem.task.arm.mass_matrix(q))[:, -1]
     row = {
-        "kinetic_energy_integral": costs.kinetic_energy,
-        "torque_integral": costs.torque,
+        "kinetic_energy_integral": costs.integrals["kinetic_energy"],
+        "torque_integral": costs.integrals["torque"],
         "min_spectral_radius": float(radius.min()),
         "min_spectral_radius_time": float(times[radius.argmin()]),
     }
@@ -244,7 +264,7 @@ def _under(
     """What these masses give for every printed number; motions that are not `known` at them are found from nothing."""
     motions = known | _solve([key for key in _wanted(printed) if key not in known], masses, seed, workers)
     found = {key: quantities(_problem(key[0], masses), q) for key, q in motions.items()}
-    return [found[entry.motion][entry.row.found.column] for entry in printed]
+    return [found[entry.motion][entry.found.column] for entry in printed]
 
 
 def _residuals(printed: Sequence[Printed], before: list[float], after: list[float]) -> pd.DataFrame:
@@ -267,3 +287,39 @@ def _residuals(printed: Sequence[Printed], before: list[float], after: list[floa
             }
         )
     return pd.DataFrame(rows)
+
+
+def draw(found: Identification, title: str) -> Figure:
+    """Residuals of every number, in units of its rounding, on a logarithmic scale on both sides of zero."""
+    numbers = found.numbers.iloc[::-1]
+    place = np.arange(len(numbers))
+    figure = Figure(figsize=(9.0, 0.27 * len(numbers) + 1.8), layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.add_subplot()
+    axes.axvspan(-1, 1, color="#E2E8F0", zorder=0, label="rounding of the printed digits")
+    for column, method, label, marker in (
+        ("residual_printed", "lsv", "printed masses", "x"),
+        ("residual_identified", "global", "identified masses", "o"),
+    ):
+        axes.plot(numbers[column], place, marker, color=style.color(method), markersize=5, label=label)
+    axes.set_xscale("symlog", linthresh=2.0)
+    axes.set_yticks(place, _labels(numbers), fontsize=7.5)
+    axes.set_ylim(-0.8, len(numbers) - 0.2)
+    axes.set_xlabel("Recomputed minus printed, in half units of the last printed digit")
+    masses = "  ".join(
+        f"$m_{row['link']}$ = {row['identified']:.4f} ± {(row['high'] - row['low']) / 2:.4f}"
+        for row in found.masses.to_dict("records")
+    )
+    figure.suptitle(f"{title}: {masses} kg", fontsize=11)
+    axes.grid(True, axis="x", color="0.93")
+    axes.spines[["top", "right"]].set_visible(False)
+    figure.legend(loc="outside lower center", ncols=3, frameon=False)
+    return figure
+
+
+def _labels(numbers: pd.DataFrame) -> list[str]:
+    used = np.where(numbers["used"] == "fit", "", " (not fitted)")
+    return [
+        f"{row['document']}, {row['place']}: {row['quantity']}{mark}"
+        for row, mark in zip(numbers.to_dict("records"), used, strict=True)
+    ]

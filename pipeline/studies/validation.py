@@ -1,27 +1,50 @@
-"""The planner's optima beside the stationary motions of the calculus of variations (Global paper Section 4.1, Table 4)."""
+"""The planner's optima beside the stationary motions of the calculus of variations (Global paper Section 4.1, Table 4).
+
+Two motions are the same optimum where their joint paths are; a motion without a partner says why.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from pipeline.common.markdown import cells, markdown_table
 from pipeline.evaluation.evaluation import Evaluation
 from pipeline.model.kinematics import wrap
-from pipeline.problem.problem import Problem
 from pipeline.search.selection import path_distance
+from pipeline.studies.study import Motions, Result
 
 SAME = 0.3  # [rad] largest joint difference at which a discrete and a continuous motion are the same optimum
 
 
-def table(problem: Problem, evaluations: Sequence[Evaluation]) -> pd.DataFrame:
-    """One row per motion of either method, paired by joint path; a motion without a partner says why."""
-    revolute = problem.task.arm.description.revolute
-    planner = [e for e in evaluations if e.method == "global" and e.confirmed]
-    stationary = [e for e in evaluations if e.method == "calculus_of_variations" and e.confirmed]
+@dataclass(frozen=True)
+class Validation(Result):
+    """table: see `table`."""
+
+    name: ClassVar[str] = "validation"
+    table: pd.DataFrame
+
+    def tables(self) -> Mapping[str, pd.DataFrame]:
+        return {"validation": self.table}
+
+    def section(self) -> list[str]:
+        return ["## Planner and calculus of variations", "", *markdown_table(cells(self.table))]
+
+
+def study(motions: Motions) -> Validation | None:
+    """Where both methods were asked for."""
+    return Validation(table(motions)) if motions.methods >= {"global", "calculus_of_variations"} else None
+
+
+def table(motions: Motions) -> pd.DataFrame:
+    """One row per confirmed motion of either method, paired by joint path."""
+    revolute = motions.problem.task.arm.description.revolute
+    planner, stationary = motions.confirmed("global"), motions.confirmed("calculus_of_variations")
     pairs = _pairs(planner, stationary, revolute)
     rows: list[dict[str, Any]] = []
     for index, e in enumerate(planner):

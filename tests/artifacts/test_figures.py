@@ -14,14 +14,14 @@ from matplotlib.figure import Figure
 from matplotlib.image import imread
 from scipy.spatial import ConvexHull
 
-from pipeline.artifacts import style
+from pipeline.artifacts.figures import figures as files
 from pipeline.artifacts.figures import motions as figures
 from pipeline.artifacts.figures import solids
 from pipeline.artifacts.figures.panels import thin
 from pipeline.artifacts.figures.stroboscopic import stroboscopic
 from pipeline.common.arrays import Array
 from pipeline.evaluation.evaluation import Evaluation, evaluate
-from pipeline.model.clearance import Obstacles
+from pipeline.model.obstacles import Obstacles
 from pipeline.model.task import PositionTask
 from pipeline.path.curves import Line, direction_vector
 from pipeline.path.reference import Reference
@@ -29,6 +29,8 @@ from pipeline.path.timing import RaisedCosine
 from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Solution, Status, Trajectory
 from pipeline.robot.shapes import Shape, capsule
+from pipeline.studies import style
+from tests.reports import report_of
 
 NAMES = ["reference", "energy", "stroboscopic", "joints", "torques", "spectral_radius", "tracking"]
 EVENT = 6.4
@@ -78,11 +80,10 @@ def texts(figure: Figure) -> str:
 
 def test_all_files_are_written_as_images(case: Case, tmp_path: Path) -> None:
     problem, motions = case
-    folder = tmp_path / "new" / "run"
-    files = figures.write(folder, problem, motions, name="run")
-    assert files == [folder / f"{name}.png" for name in NAMES]
-    assert sorted(folder.iterdir()) == sorted(files)
-    for file in files:
+    folder = tmp_path / "new" / "run" / "figures"
+    files.write(report_of(problem, motions), folder.parent)
+    assert {file.name for file in folder.iterdir()} == {f"{name}.png" for name in NAMES}
+    for file in folder.iterdir():
         height, width, _ = imread(file).shape
         assert 700 <= width <= 2500, file.name
         assert 300 <= height <= 2500, file.name
@@ -141,7 +142,10 @@ def test_columns_draw_every_joint(case: Case) -> None:
 
 def test_legend_gives_the_final_integral(case: Case) -> None:
     problem, motions = case
-    motions = [replace(e, energy_integral=np.linspace(0.0, 0.1234 + k, 101)) for k, e in enumerate(motions)]
+    rising = [np.linspace(0.0, 0.1234 + k, 101) for k in range(len(motions))]
+    motions = [
+        replace(e, integrals={**e.integrals, "kinetic_energy": one}) for e, one in zip(motions, rising, strict=True)
+    ]
     shown = texts(figures.energy(problem, motions, "run"))
     for e in motions:
         assert f"{style.name(e.label)}\n{e.energy_integral[-1]:.4g} J s" in shown
@@ -205,7 +209,8 @@ def test_spatial_motion_is_shown_in_space(case: Case) -> None:
 def test_every_axis_has_its_unit_and_every_figure_its_name(case: Case) -> None:
     problem, motions = case
     for name in NAMES:
-        figure = getattr(figures, name)(problem, motions, "run 7")
+        figure = files.FIGURES[name](problem, motions, "run 7")
+        assert figure is not None
         assert "run 7" in figure.get_suptitle()
         labels = [axes.get_ylabel() for axes in figure.axes] + [axes.get_xlabel() for axes in figure.axes]
         labels = [label for label in labels if label]
@@ -234,7 +239,9 @@ def test_a_gap_in_the_numbers_does_not_stop_the_figures(case: Case) -> None:
 
 def test_nothing_is_left_behind_by_a_failure(case: Case, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     problem, motions = case
-    (tmp_path / "reference.png").write_bytes(b"of an earlier run")
+    folder = tmp_path / "figures"
+    folder.mkdir()
+    (folder / "reference.png").write_bytes(b"of an earlier run")
 
     def full(self: Figure, file: Path, **options: object) -> None:
         Path(file).write_bytes(b"half a pict")
@@ -242,9 +249,9 @@ def test_nothing_is_left_behind_by_a_failure(case: Case, tmp_path: Path, monkeyp
 
     monkeypatch.setattr(Figure, "savefig", full)
     with pytest.raises(OSError, match="no space"):
-        figures.write(tmp_path, problem, motions, name="run")
-    assert [file.name for file in tmp_path.iterdir()] == ["reference.png"]
-    assert (tmp_path / "reference.png").read_bytes() == b"of an earlier run"
+        files.write(report_of(problem, motions), tmp_path)
+    assert [file.name for file in folder.iterdir()] == ["reference.png"]
+    assert (folder / "reference.png").read_bytes() == b"of an earlier run"
 
 
 SOLIDS = [

@@ -22,7 +22,7 @@ def motion() -> Resampled:
 
 
 def test_the_table(motion: Resampled, tmp_path: Path) -> None:
-    export.write(tmp_path, motion, JOINTS, "base")
+    export.save(tmp_path, motion, JOINTS, "base")
     table = pd.read_csv(tmp_path / "motion.csv")
     kinds = ("position", "velocity", "acceleration")
     assert list(table.columns) == ["time", *(f"{joint}_{kind}" for kind in kinds for joint in JOINTS)]
@@ -32,7 +32,7 @@ def test_the_table(motion: Resampled, tmp_path: Path) -> None:
 
 def test_the_message_of_ros(motion: Resampled, tmp_path: Path) -> None:
     """The fields of trajectory_msgs/JointTrajectory and of its points, neither more nor fewer."""
-    export.write(tmp_path, motion, JOINTS, "base")
+    export.save(tmp_path, motion, JOINTS, "base")
     message = json.loads((tmp_path / "motion.json").read_text(encoding="utf-8"))
     assert yaml.safe_load((tmp_path / "motion.yaml").read_text(encoding="utf-8")) == message
     assert list(message) == ["header", "joint_names", "points"]

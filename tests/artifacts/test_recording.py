@@ -20,7 +20,6 @@ import rerun as rr
 from rerun.chunk import RrdReader
 from rerun.experimental import ViewerClient
 
-from pipeline.artifacts import style
 from pipeline.artifacts.recording import blueprint, recording
 from pipeline.artifacts.recording.arm import _rigid
 from pipeline.config.methods import GlobalOptions, LsvOptions
@@ -29,7 +28,7 @@ from pipeline.methods.global_planner.planner import global_planner
 from pipeline.methods.lsv import lsv
 from pipeline.methods.registry import METHODS
 from pipeline.model.arm import Arm
-from pipeline.model.clearance import Obstacles
+from pipeline.model.obstacles import Obstacles
 from pipeline.model.task import PositionTask
 from pipeline.path.curves import Line, direction_vector
 from pipeline.path.reference import Reference
@@ -37,6 +36,7 @@ from pipeline.path.timing import RaisedCosine
 from pipeline.problem.problem import Problem
 from pipeline.robot import urdf
 from pipeline.robot.shapes import Shape, capsule
+from pipeline.studies import style
 from tests.support import ROOT
 
 ROBOT = ROOT / "robots" / "planar3r.urdf"
@@ -64,7 +64,7 @@ def case() -> Case:
 
 
 def write(file: Path, problem: Problem, evaluations: Sequence[Evaluation]) -> None:
-    recording.write(file, problem, evaluations, name="line", summary="# A line\n\nthe text", properties=PROPERTIES)
+    recording.save(file, problem, evaluations, name="line", summary="# A line\n\nthe text", properties=PROPERTIES)
 
 
 def chunks(file: Path, content: str) -> list[object]:

@@ -13,9 +13,8 @@ from scipy.spatial.transform import Rotation
 from pipeline.artifacts.recording.recording import read_series
 from pipeline.artifacts.scene import box, corners
 from pipeline.build.problem import prepare
-from pipeline.evaluation.base import Base
-from pipeline.model.base import FloatingArm
-from pipeline.run import run
+from pipeline.evaluation.base import BaseMotion
+from pipeline.run.run import run
 from tests.support import composed
 
 SMALL = (
@@ -29,7 +28,7 @@ SMALL = (
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     made = tmp_path_factory.mktemp("floating")
-    assert run.run_and_write(composed("+experiment=floating3r", *SMALL, "parallel.workers=1"), made) == 0
+    assert run(composed("+experiment=floating3r", *SMALL, "parallel.workers=1"), made) == 0
     return made
 
 
@@ -79,11 +78,10 @@ def test_the_box_has_the_mass_and_inertia() -> None:
     moments = mass * (np.sum(edges**2) - edges**2) / 12
     words = ("robot=panda", "path.direction=[0,1,0]", "base=free", f"base.mass={mass}", "base.com=[0,0,-0.2]")
     problem = prepare(composed(*words, f"base.inertia={moments.tolist()}"))
-    assert isinstance(problem.task.arm, FloatingArm)
     shape = box(problem.task.arm)
     seen = np.abs(Rotation.from_rotvec(shape.rotation).apply(np.diag(shape.size))).sum(axis=0)
     np.testing.assert_allclose(seen, edges, rtol=1e-9)
-    still = Base(np.zeros((1, 3)), np.eye(3)[None], np.zeros(1), None, {}, None)
+    still = BaseMotion(np.zeros((1, 3)), np.eye(3)[None], np.zeros(1), None, {}, None)
     placed = corners(problem.task.arm, still)[0]
     np.testing.assert_allclose(placed.min(axis=0), [-0.4, -0.3, -0.4], atol=1e-9)
     np.testing.assert_allclose(placed.max(axis=0), [0.4, 0.3, 0.0], atol=1e-9)
@@ -99,7 +97,7 @@ def test_front_of_rotation_against_energy(tmp_path: Path) -> None:
         "method.pareto.rounds=1",
         "method.pareto.max_iterations=60",
     )
-    assert run.run_and_write(composed("+experiment=floating_front", *words, "parallel.workers=1"), tmp_path) == 0
+    assert run(composed("+experiment=floating_front", *words, "parallel.workers=1"), tmp_path) == 0
     front = pd.read_csv(tmp_path / "front.csv")
     good = front[front["status"] == "optimal"]
     assert len(good) >= 10

@@ -1,31 +1,28 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
-import yaml
 
 from pipeline.artifacts import summary as tables
 from pipeline.artifacts import sweep
-from pipeline.artifacts.markdown import markdown
+from pipeline.artifacts.report import Report
 from pipeline.common.arrays import Array
-from pipeline.config import run as config
+from pipeline.config.documents import Printed, printed_for
 from pipeline.config.run import RunConfig
-from pipeline.config.studies import PublishedConfig
 from pipeline.evaluation.evaluation import Evaluation, evaluate
 from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Solution, Status, Trajectory
-from pipeline.studies.studies import Extras
+from tests.reports import report_of
 from tests.support import ROOT
 
 Make = Callable[[int, int], Problem]
 EXPERIMENTS = sorted((ROOT / "conf" / "experiment").glob("*.yaml"))
-PUBLISHED = PublishedConfig(
-    document="A paper", note="A note.", values={"lsv": {"kinetic_energy_integral": 1e-3, "singular_time": 6.5}}
-)
+PRINTED = Printed({"lsv": {"kinetic_energy_integral": 1e-3, "singular_time": 6.5}}, "A paper", "A note.")
 
 
 @pytest.fixture
@@ -45,8 +42,15 @@ def motions(asked: Problem, guess: Callable[[Problem], Array]) -> list[Evaluatio
 
 
 @pytest.fixture
-def summary(asked: Problem, motions: list[Evaluation]) -> pd.DataFrame:
-    return tables.summary(asked, motions, {"lsv": 0.5, "global": 2.5}, PUBLISHED)
+def report(asked: Problem, motions: list[Evaluation], monkeypatch: pytest.MonkeyPatch) -> Report:
+    monkeypatch.setattr(tables, "printed_for", lambda name: PRINTED)
+    made = report_of(asked, motions, settings=RunConfig(name="mine"))
+    return replace(made, seconds={"lsv": 0.5, "global": 2.5})
+
+
+@pytest.fixture
+def summary(report: Report) -> pd.DataFrame:
+    return tables.summary(report)
 
 
 def test_summary_is_one_row_per_motion(motions: list[Evaluation], summary: pd.DataFrame) -> None:
@@ -76,13 +80,14 @@ def test_printed_values_stand_beside_the_first_optimum_of_their_method(summary: 
 @pytest.mark.parametrize("file", EXPERIMENTS, ids=lambda file: file.stem)
 def test_every_printed_number_has_a_column_to_compare_it_with(file: Path, summary: pd.DataFrame) -> None:
     """A misspelt column would silently compare nothing."""
-    printed = yaml.safe_load(file.read_text(encoding="utf-8")).get("published", {}).get("values", {})
-    for method, values in printed.items():
+    for method, values in printed_for(file.stem).values.items():
         assert set(values) <= set(summary.columns), method
 
 
-def test_trajectories_read_back_as_they_are(tmp_path: Path, motions: list[Evaluation], summary: pd.DataFrame) -> None:
-    tables.write(tmp_path, motions, summary, "text", Extras())
+def test_trajectories_read_back_as_they_are(
+    tmp_path: Path, motions: list[Evaluation], report: Report, summary: pd.DataFrame
+) -> None:
+    tables.write(report, tmp_path)
     read = pd.read_parquet(tmp_path / "trajectories.parquet")
     kinds = [f"{name}_{j}" for name in ("q", "qd", "qdd", "tau") for j in (1, 2, 3)]
     assert list(read.columns) == ["method", "optimum", "time", *kinds, "x", "y", "z"]
@@ -93,7 +98,7 @@ def test_trajectories_read_back_as_they_are(tmp_path: Path, motions: list[Evalua
         np.testing.assert_array_equal(part["time"], motion.time)
     own, back = (part.astype(object).fillna("") for part in (summary, pd.read_csv(tmp_path / "summary.csv")))
     pd.testing.assert_frame_equal(back, own, check_dtype=False)
-    assert (tmp_path / "summary.md").read_text(encoding="utf-8") == "text"
+    assert (tmp_path / "summary.md").read_text(encoding="utf-8") == tables.text(report)
     assert sorted(file.name for file in tmp_path.iterdir()) == ["summary.csv", "summary.md", "trajectories.parquet"]
 
 
@@ -101,8 +106,8 @@ def table_rows(text: str) -> list[list[str]]:
     return [[cell.strip() for cell in line.strip("|").split("|")] for line in text.splitlines() if line.startswith("|")]
 
 
-def test_summary_for_people(asked: Problem, motions: list[Evaluation], summary: pd.DataFrame) -> None:
-    text = markdown(RunConfig(name="mine", published=PUBLISHED), asked, motions, summary, Extras())
+def test_summary_for_people(motions: list[Evaluation], report: Report) -> None:
+    text = tables.text(report)
     rows = table_rows(text)
     assert rows[0] == ["", "lsv", "global", "global 2"]
     assert {len(row) for row in rows} == {4}
@@ -157,11 +162,12 @@ def test_a_sweep_without_any_summary_writes_nothing(tmp_path: Path) -> None:
     assert [file.name for file in tmp_path.iterdir()] == ["0_run"]
 
 
-def test_a_printed_zero_or_an_unknown_column_is_no_crash(asked: Problem, motions: list[Evaluation]) -> None:
+def test_a_printed_zero_or_an_unknown_column_is_no_crash(
+    asked: Problem, motions: list[Evaluation], monkeypatch: pytest.MonkeyPatch
+) -> None:
     values = {"lsv": {"torque_integral": 0.0, "nonsense": 1.0}}
-    published = config.check({"published": {"values": values}}).published
+    monkeypatch.setattr(tables, "printed_for", lambda name: Printed(values))
+    report = report_of(asked, motions, settings=RunConfig())
     with np.errstate(divide="ignore"):
-        table = tables.summary(asked, motions, {"lsv": 0.5, "global": 2.5}, published)
-    assert np.isnan(table["difference_nonsense"][0])
-    text = markdown(RunConfig(published=published), asked, motions, table, Extras())
-    assert "printed 0" in text
+        assert np.isnan(tables.summary(report)["difference_nonsense"][0])
+        assert "printed 0" in tables.text(report)

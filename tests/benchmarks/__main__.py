@@ -20,7 +20,7 @@ from pipeline.methods.global_planner.planner import global_planner, refinement
 from pipeline.methods.pmke.predictive import pmke
 from pipeline.methods.pmke.window import Window
 from pipeline.problem.lagrangian import Lagrangian
-from pipeline.program.program import Transcription
+from pipeline.program.transcription import transcribe
 from tests.benchmarks import peer, planner
 
 REPEATS = 7
@@ -80,7 +80,7 @@ def fine_solve() -> None:
     ours, theirs = [], []
     for _ in range(REPEATS):
         milliseconds, (q, _, iterations) = timed(
-            lambda: Transcription(problem, problem.times, guess).solve(tolerance=options.tolerance)
+            lambda: transcribe(problem, problem.times, guess).solve(tolerance=options.tolerance)
         )
         ours.append(milliseconds)
         milliseconds, (other, _, statistics) = timed(lambda: peer.solve(program, problem.q_init, path, guess[1:]))

@@ -66,7 +66,7 @@ class Peer(Side):
         self.arm = peer.PlanarArm.from_urdf(peer.ROBOT)
 
     def program(self, problem: Problem, times: Array, options: GlobalOptions) -> peer.Program:
-        limits, torque = problem.bounds, problem.objective.torque > 0
+        limits, torque = problem.bounds, problem.objective.second_order
         key = (len(times), torque, bool(np.isfinite(limits.torque).any()))
         if key not in self.programs:
             begin = time.perf_counter()
@@ -118,7 +118,7 @@ def simulation(name: str) -> None:
     note = f"of {len(motions)} starts {counts[0]} and {counts[1]} converged; CasADi built its functions in"
     line(f"{name}, population", ours.seconds, theirs.seconds, f"{note} {theirs.construction:.2f} s besides")
     found = {"ours": ours.optima, "peer": theirs.optima}
-    if not problem.objective.torque:
+    if not problem.objective.second_order:
         begin = time.perf_counter()
         solutions = global_planner(problem, replace(options, starts="dynamic_programming"), Context(config.seed))
         seconds = time.perf_counter() - begin

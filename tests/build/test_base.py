@@ -7,12 +7,7 @@ import pytest
 
 from pipeline.build.problem import prepare
 from pipeline.common.errors import ConfigError
-from pipeline.model.base import FloatingArm
-<<<<<<< HEAD
-from pipeline.run import run
-=======
 from pipeline.run.solve import state
->>>>>>> wt-methods
 from tests.support import composed
 
 FREE = ("base=free", "base.mass=10", "base.inertia=0.2")
@@ -40,16 +35,16 @@ PANDA = ("robot=panda", "path.direction=[0,1,0]", "path.length=0.1")
         ((*FREE, "base.linear_momentum=[0,0,1]"), r"base: a planar arm has linear momentum in x and y"),
         (
             (*FREE, "methods=[dynamic_programming]"),
-            r"dynamic_programming: the base moves.* fixed base; methods that serve this problem: lsv, inertia_weighted, pmke, receding, global, pareto$",
+            r"dynamic_programming: the base is floating; .* fixed base; methods that serve this problem: lsv, inertia_weighted, pmke, receding, global, pareto$",
         ),
         (
             (*FREE, "methods=[calculus_of_variations,pontryagin]"),
-            r"calculus_of_variations: the base moves, or is held .* fixed base",
+            r"calculus_of_variations: the base is (held|floating); .* fixed base",
         ),
-        (("objective=reaction", "methods=[pontryagin]"), r"pontryagin: the base moves, or is held .* fixed base"),
+        (("objective=reaction", "methods=[pontryagin]"), r"pontryagin: the base is (held|floating); .* fixed base"),
         (
             (*FREE, "method.global.starts=both"),
-            r"global: method\.global\.starts = both: dynamic_programming: the base moves.* starts = population",
+            r"global: method\.global\.starts = both: dynamic_programming: the base is floating; .* starts = population",
         ),
         ((*FREE, "closed_loop.run=true"), r"closed_loop\.run: the controller is one for arms on a fixed base"),
         (("objective=reaction", "objective.torque=0"), r"objective = reaction: all its weights are zero"),
@@ -64,10 +59,10 @@ def test_what_does_not_go_together(words: tuple[str, ...], message: str) -> None
 
 def test_a_planar_arm_has_three_more_coordinates_and_a_spatial_one_six() -> None:
     plane, space = prepare(composed(*FREE)), prepare(composed(*PANDA, *FREE, "limits=joint", "limits.attitude=0.2"))
-    assert plane.task.arm.base_coordinates == 3
+    assert plane.task.arm.base.count == 3
     assert plane.task.redundancy == 1
     np.testing.assert_array_equal(plane.q_init, [0, 0, 0, 0, 0.327, -0.754])
-    assert space.task.arm.base_coordinates == 6
+    assert space.task.arm.base.count == 6
     assert space.task.redundancy == 4
     assert np.isinf(space.bounds.upper[:6]).all()
     assert np.isfinite(space.bounds.upper[6:]).all()
@@ -86,6 +81,6 @@ def test_the_root_link_or_a_body_bolted_to_it() -> None:
 
 def test_a_reaction_holds_the_base() -> None:
     problem = prepare(composed("objective=reaction", "gravity=earth"))
-    assert isinstance(problem.task.arm, FloatingArm)
-    assert not problem.task.arm.floats
-    assert prepare(composed()).task.arm.base_coordinates == 0
+    assert problem.task.arm.base.kind == "held"
+    assert problem.task.arm.base.count == 3
+    assert prepare(composed()).task.arm.base.kind == "fixed"

@@ -1,60 +1,65 @@
 from __future__ import annotations
 
 import dataclasses
-from dataclasses import dataclass
-from typing import Any
+import pickle
+from dataclasses import field
+from typing import Annotated, Any, Literal
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pydantic import Field
 
 from pipeline.common.errors import ConfigError
 from pipeline.config.fields import (
-    angle_or_vector,
-    any_number,
+    Number,
+    Numbers,
+    OneOrList,
+    Switch,
+    Text,
+    Vector,
+    Whole,
+    WordOrVector,
+    Words,
     build,
-    choice,
-    choices,
-    count,
-    mapping,
-    number,
-    numbers,
-    one_of,
-    part,
-    switch,
-    text,
+    schema,
 )
 
 
-@dataclass(frozen=True)
+@schema
 class Line:
-    length: float = number(0.4, above=0, unit="m")
+    length: Annotated[Number, Field(gt=0, description="[m] length")] = 0.4
+    kind: Literal["line"] = "line"
 
 
-@dataclass(frozen=True)
+@schema
 class Circle:
-    radius: float = number(0.1, above=0, high=1, unit="m")
+    radius: Annotated[Number, Field(gt=0, le=1, description="[m] radius")] = 0.1
+    kind: Literal["circle"] = "circle"
 
 
-@dataclass(frozen=True)
+@schema
 class Inner:
-    gain: float = number(0.0, low=0)
-    steps: int = count(10, low=2, high=20)
+    gain: Annotated[Number, Field(ge=0)] = 0.0
+    steps: Annotated[Whole, Field(ge=2, le=20)] = 10
 
 
-@dataclass(frozen=True)
+@schema
 class Outer:
-    free: float | None = number(None)
-    law: str = choice("quintic", "quintic", "linear")
-    axes: list[str] = choices(["x"], "x", "y")  # noqa: RUF009
-    on: bool = switch(True)
-    label: str = text("a")
-    point: list[float] = numbers([0.0, 0.0], length=2, unit="m")  # noqa: RUF009
-    direction: float | list[float] = angle_or_vector(0.0)  # noqa: RUF009
-    table: dict[str, float] = mapping(any_number)  # noqa: RUF009
-    inner: Inner = part(Inner)  # noqa: RUF009
-    global_: Inner = part(Inner)  # noqa: RUF009
-    path: Line | Circle = one_of({"line": Line, "circle": Circle}, "line")  # noqa: RUF009
+    free: Number | None = None
+    law: Annotated[Literal["quintic", "linear"], Field(description="of motion")] = "quintic"
+    axes: Words[Literal["x", "y"]] = ("x",)
+    on: Switch = True
+    label: Text = "a"
+    point: Annotated[Numbers, Field(min_length=2, max_length=2, description="[m] a place")] = (0.0, 0.0)
+    direction: Annotated[OneOrList[Number], Field(description="[deg] angle, or a vector")] = 0.0
+    weight: Annotated[WordOrVector[Literal["none", "earth"]], Field(description="[m/s^2] acceleration")] = "none"
+    normal: Vector = (0.0, 0.0, 1.0)
+    table: dict[str, Number] = field(default_factory=dict)
+    inner: Inner = Inner()
+    global_: Annotated[Inner, Field(alias="global")] = Inner()
+    path: Annotated[Line | Circle, Field(discriminator="kind")] = Line()
+    paths: dict[str, tuple[Annotated[Line | Circle, Field(discriminator="kind")], ...]] | None = None
 
 
 NAN = float("nan")
@@ -93,6 +98,19 @@ FAULTS: list[tuple[dict[str, Any], list[str]]] = [
     ({"inner": {"gian": 1}}, ["inner.gian: unknown key; did you mean gain?", "allowed: gain, steps"]),
     ({"zzz": 1}, ["zzz: unknown key; allowed: axes, direction, free, global, inner"]),
     ({"free": 10**400}, ["free"]),
+    ({"weight": "moon"}, ["weight = 'moon'", "none, earth or a list of 3 numbers m/s^2", "acceleration"]),
+    ({"weight": [0.0, 1.0]}, ["weight = [0.0, 1.0]", "none, earth or a list of 3 numbers m/s^2"]),
+    ({"normal": [0.0, 1.0]}, ["normal", "a list of 3 numbers"]),
+    ({"direction": "north"}, ["direction = 'north'", "a number deg or a list of numbers deg"]),
+    ({"law": "quintik"}, ["did you mean quintic?"]),
+    ({"path": {"kind": "circel"}}, ["did you mean circle?"]),
+    ({"global": {"gain": -1}}, ["global.gain = -1"]),
+    ({"global_": {"gain": 1}}, ["global_: unknown key; did you mean global?"]),
+    ({"paths": {"a": [{"kind": "line"}, {"kind": "line", "length": 0}]}}, ["paths.a[1].length = 0", "> 0 m (length)"]),
+    ({"paths": {"a": {"kind": "line"}}}, ["paths.a = ", "a list of tables"]),
+    ({"free": []}, ["must be a number or null"]),
+    ({"on": None}, ["on = null", "must be true or false"]),
+    ({1: 2}, ["1: unknown key"]),
 ]
 
 
@@ -121,9 +139,9 @@ def test_good_values_are_converted_and_the_rest_are_defaults() -> None:
     )
     assert made == Outer(
         free=2.0,
-        axes=["y", "x"],
-        point=[1.0, 2.0],
-        direction=[1.0, 0.0, 0.0],
+        axes=("y", "x"),
+        point=(1.0, 2.0),
+        direction=(1.0, 0.0, 0.0),
         table={"j1": 1.0},
         inner=Inner(steps=4),
         global_=Inner(gain=3.0),
@@ -136,15 +154,40 @@ def test_good_values_are_converted_and_the_rest_are_defaults() -> None:
 
 
 def test_defaults_are_not_shared() -> None:
-    assert Outer().point is not Outer().point
     assert Outer().table is not Outer().table
+
+
+def test_a_value_stays_what_it_is() -> None:
+    """Nobody changes the configuration of a run: neither its fields nor what stands in them."""
+    made = Outer()
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        made.free = 1.0  # type: ignore[misc]
+    assert isinstance(build(Outer, {"point": [1, 2]}).point, tuple)
+
+
+def test_python_is_as_strict_as_a_file() -> None:
+    """One line that names the class and the key, also where a copy is changed."""
+    for make in (lambda: Inner(gain=-1), lambda: dataclasses.replace(Inner(), gain=-1)):
+        with pytest.raises(ConfigError, match=r"^Inner\.gain = -1: must be a number >= 0$"):
+            make()
+    with pytest.raises(ConfigError, match=r"^Inner\.gian: unknown key; did you mean gain\?"):
+        Inner(gian=1)  # type: ignore[call-arg]
+    with pytest.raises(ConfigError, match=r"^Inner: 2 values at most, in the order gain, steps"):
+        Inner(1.0, 2, 3)  # type: ignore[call-arg]
+
+
+def test_a_copy_of_another_process_is_the_same() -> None:
+    made = Outer(inner=Inner(3.0), path=Circle(0.5))
+    assert pickle.loads(pickle.dumps(made)) == made
+    assert dataclasses.asdict(made)["path"] == {"kind": "circle", "radius": 0.5}
 
 
 @given(st.floats(allow_nan=False), st.floats(-5, 5), st.floats(-5, 5))
 def test_bounds_are_kept_exactly(value: float, low: float, high: float) -> None:
-    made = dataclasses.make_dataclass("Made", [("v", float, number(0.0, low=low, high=high))], frozen=True)
+    bounded = Annotated[Number, Field(ge=low, le=high)]
+    Made = schema(type("Made", (), {"__annotations__": {"v": bounded}, "v": low}))
     if low <= value <= high:
-        assert build(made, {"v": value}).v == value  # type: ignore[attr-defined]
+        assert build(Made, {"v": value}).v == value
     else:
         with pytest.raises(ConfigError, match=r"^group\.v = "):
-            build(made, {"v": value}, "group")
+            build(Made, {"v": value}, "group")

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import json
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -12,18 +14,19 @@ from omegaconf import DictConfig, OmegaConf
 
 from pipeline.config import compose as composing
 from pipeline.config import run as schema
+from pipeline.config.documents import printed_for
 from pipeline.config.methods import METHODS as ALL_METHODS
 from pipeline.methods.registry import METHODS as REGISTRY
 from tests.support import ROOT
 
 CONF = ROOT / "conf"
-EXPERIMENTS = sorted(file.stem for file in (CONF / "experiment").glob("*.yaml"))
+EXPERIMENTS = sorted(file.stem for file in (CONF / "experiment").glob("[!_]*.yaml"))
 OPTIONS = sorted(
     f"{file.parent.name}={file.stem}"
-    for file in CONF.glob("*/*.yaml")
+    for file in CONF.glob("*/[!_]*.yaml")
     if file.parent.name not in ("experiment", "method", "reproduction")
 )
-METHODS = sorted(file.stem for file in (CONF / "method").glob("*.yaml"))
+METHODS = sorted(file.stem for file in (CONF / "method").glob("[!_]*.yaml"))
 
 
 def composed(*overrides: str) -> DictConfig:
@@ -38,6 +41,12 @@ def checked(*overrides: str) -> schema.RunConfig:
 
 def text_of(experiment: str) -> str:
     return (CONF / "experiment" / f"{experiment}.yaml").read_text(encoding="utf-8")
+
+
+def plain(made: Any) -> dict[str, Any]:
+    """As a file would say it: lists in place of tuples."""
+    found: dict[str, Any] = json.loads(json.dumps(dataclasses.asdict(made)))
+    return found
 
 
 def keys(values: Any, where: str = "") -> set[str]:
@@ -68,7 +77,7 @@ def test_the_files_hold_every_key_of_the_schema() -> None:
     own = OmegaConf.to_container(
         OmegaConf.masked_copy(composed(), [f.name for f in dataclasses.fields(schema.RunConfig)]), resolve=True
     )
-    defaults = dataclasses.asdict(schema.RunConfig())
+    defaults = plain(schema.RunConfig())
     defaults["method"]["global"] = defaults["method"].pop("global_")
     assert keys(own) == keys(defaults)
 
@@ -78,11 +87,10 @@ def test_every_option_of_every_group(option: str) -> None:
     group, _, name = option.partition("=")
     made = getattr(checked(option), group)
     file = yaml.safe_load((CONF / group / f"{name}.yaml").read_text(encoding="utf-8"))
-    expected = {key: None if value == "???" else value for key, value in file.items()}
-    for key, value in expected.items():
-        if value is not None:
-            assert dataclasses.asdict(made)[key] == value, key
-    assert set(expected) == {field.name for field in dataclasses.fields(made)}
+    for key, value in file.items():
+        if key != "defaults" and value not in (None, "???"):
+            assert plain(made)[key] == value, key
+    assert set(composed(option)[group]) == {field.name for field in dataclasses.fields(made)}
     # What an option leaves alone is the default of its kind: only what the option is for may differ.
     mounted = {"end_effector", "task", "armature", "collision"}
     own_words = {
@@ -107,8 +115,8 @@ def test_every_method_has_its_options() -> None:
 def test_every_experiment(experiment: str) -> None:
     config = checked(f"+experiment={experiment}")
     assert config.name == experiment
-    assert config != dataclasses.replace(schema.RunConfig(), name=experiment), "an experiment that changes nothing"
-    assert set(config.published.values) <= set(config.methods), "a printed number without a method to compare it with"
+    plain_run = dataclasses.replace(schema.RunConfig(), name=experiment)
+    assert config != plain_run or printed_for(experiment).document, "an experiment that changes nothing"
 
 
 @pytest.mark.parametrize("experiment", EXPERIMENTS)
@@ -119,14 +127,27 @@ def test_an_experiment_starts_with_the_command_that_runs_it(experiment: str) -> 
 
 @pytest.mark.parametrize("experiment", EXPERIMENTS)
 def test_an_experiment_holds_only_differences(experiment: str) -> None:
-    """A value that the composition has anyway does not belong there; methods may be said again."""
+    """A value that it inherits anyway does not belong there; methods may be said again."""
     own = yaml.safe_load(text_of(experiment))
-    picks = [f"{key.removeprefix('override /')}={name}" for row in own.pop("defaults", []) for key, name in row.items()]
+    picks = []
+    for row in own.pop("defaults", []):
+        pairs = row.items() if isinstance(row, dict) else [("+experiment", row)]
+        picks += [f"{key.removeprefix('override /')}={name}" for key, name in pairs]
     without = OmegaConf.to_container(composed(*picks), resolve=False)
     assert isinstance(without, dict)
     for group in ("robot", "limits", "boundary", "objective", "parallel"):
         for key, value in (own.get(group) or {}).items():
             assert without[group][key] != value, f"{group}.{key}"
+
+
+@pytest.mark.parametrize("file", sorted(CONF.glob("*/_*.yaml")), ids=lambda file: f"{file.parent.name}/{file.stem}")
+def test_what_is_inherited_is_inherited_by_several(file: Path) -> None:
+    heirs = [other for other in file.parent.glob("*.yaml") if inherits(other, file.stem)]
+    assert len(heirs) >= 2
+
+
+def inherits(file: Path, name: str) -> bool:
+    return name in (yaml.safe_load(file.read_text(encoding="utf-8")).get("defaults") or [])
 
 
 @pytest.mark.parametrize("experiment", EXPERIMENTS)

@@ -19,7 +19,7 @@ from pipeline.problem.limits import Limits
 from pipeline.problem.objective import Objective
 from pipeline.problem.problem import Boundary, Problem
 from pipeline.problem.solution import Solution, Status, Trajectory
-from pipeline.program.program import Transcription
+from pipeline.program.transcription import transcribe
 
 Make = Callable[[int, int], Problem]
 Guess = Callable[[Problem], Array]
@@ -47,7 +47,7 @@ def traced(task: PositionTask, knots: Array, at_rest: bool) -> Problem:
     """A torque problem from rest, which ties the first velocity, or an energy problem entered at speed."""
     ends = ((1, np.zeros(3)), "not-a-knot") if at_rest else "not-a-knot"
     timing = RaisedCosine(3.0) if at_rest else ConstantSpeed(3.0)
-    objective = Objective(0.0, 1.0) if at_rest else Objective()
+    objective = Objective({"torque": 1.0}) if at_rest else Objective()
     reference = Traced(task, CubicSpline(TIME, knots, bc_type=ends), timing)
     return Problem(task, reference, knots[0], TIME, objective=objective)  # type: ignore[arg-type]
 
@@ -157,7 +157,7 @@ def test_differences_by_boundary() -> None:
 def test_the_published_optima(problem: Make, guess: Guess, number: int, published: float) -> None:
     """PMKE paper, Table 5, 101 points, in the digits that independent software gives."""
     asked = problem(number, 100)
-    q, _, _ = Transcription(asked, asked.times, guess(asked)).solve()
+    q, _, _ = transcribe(asked, asked.times, guess(asked)).solve()
     got = evaluate(asked, Solution("global", Trajectory(asked.times, q), Status.SOLVED, tracking_tolerance=1e-8))
     assert got.confirmed
     assert got.energy_integral[-1] == pytest.approx(published, rel=2e-4)

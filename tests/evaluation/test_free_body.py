@@ -17,13 +17,12 @@ from pipeline.methods.lsv import inertia_weighted, lsv
 from pipeline.methods.method import Context
 from pipeline.methods.pmke.predictive import pmke
 from pipeline.methods.registry import METHODS
-from pipeline.model.base import FloatingArm
 from pipeline.problem.costs import integrals
-from pipeline.problem.objective import IntegralBounds, Objective
+from pipeline.problem.objective import Objective
 from pipeline.problem.problem import Boundary, Problem
 from pipeline.problem.solution import Solution, Status, Trajectory
 from pipeline.program.feasibility import least_violation, violations
-from pipeline.program.program import Transcription
+from pipeline.program.transcription import transcribe
 from tests.program.test_program import program_jacobian, program_value
 from tests.support import composed
 
@@ -43,11 +42,6 @@ def stated(*overrides: str) -> tuple[Problem, Solution]:
 def solved(*overrides: str) -> tuple[Problem, Evaluation]:
     problem, solution = stated(*overrides)
     return problem, evaluate(problem, solution)
-
-
-def floating(problem: Problem) -> FloatingArm:
-    assert isinstance(problem.task.arm, FloatingArm)
-    return problem.task.arm
 
 
 STARTS = {"fixed": (), "free": ("boundary=free",), "cyclic": CIRCLE}
@@ -92,8 +86,8 @@ def test_the_path_error_is_of_second_order_in_the_step() -> None:
     errors = []
     for steps in (50, 100, 200):
         problem, solution = stated(*ON_BASE[:-2], f"timing.steps={steps}", "method.global.optimised=1")
-        nb = problem.task.arm.base_coordinates
-        found = integrate(problem, floating(problem), solution.trajectory.time, solution.trajectory.q[:, nb:])
+        joints = solution.trajectory.q[:, problem.task.arm.joints]
+        found = integrate(problem, solution.trajectory.time, joints)
         errors.append(found.path_error)
     order = np.log2(np.array(errors[:-1]) / errors[1:])
     assert errors[-1] < 1e-6
@@ -197,7 +191,7 @@ def test_a_cycle_with_torques() -> None:
     assert e.status is Status.SOLVED, e.message
     assert np.abs(e.q[-1] - e.q[0]).max() < 1e-9
     costs = integrals(problem, problem.times, e.solution.trajectory.q)
-    assert e.torque_integral[-1] == pytest.approx(costs.torque, rel=1e-6)
+    assert e.torque_integral[-1] == pytest.approx(costs.integrals["torque"], rel=1e-6)
     energy = solved(*ON_BASE, *CIRCLE)[1]
     assert e.torque_integral[-1] < energy.torque_integral[-1]
 
@@ -263,13 +257,12 @@ def test_least_reaction_on_a_held_base() -> None:
     words = (*SHORT, "boundary=free", "objective=reaction", "objective.force=0.1")
     problem, e = solved(*words)
     plain, energy = solved(*SHORT, "boundary=free")
-    assert isinstance(problem.task.arm, FloatingArm)
-    assert not problem.task.arm.floats
+    assert problem.task.arm.base.kind == "held"
     assert e.status is Status.SOLVED, e.message
     assert e.objective == pytest.approx(0.1 * e.integral("reaction_force") + e.integral("reaction_torque"))
     costs = integrals(problem, problem.times, e.solution.trajectory.q)
-    assert e.integral("reaction_force") == pytest.approx(costs.reaction_force, rel=1e-6)
-    assert e.integral("reaction_torque") == pytest.approx(costs.reaction_torque, rel=1e-6)
+    assert e.integral("reaction_force") == pytest.approx(costs.integrals["reaction_force"], rel=1e-6)
+    assert e.integral("reaction_torque") == pytest.approx(costs.integrals["reaction_torque"], rel=1e-6)
     assert e.objective < 0.8 * (0.1 * energy.integral("reaction_force") + energy.integral("reaction_torque"))
     # The same joints on the plain fixed base: the same energies and torques.
     again = evaluate(plain, Solution("x", Trajectory(e.time, e.q), Status.SOLVED))
@@ -289,14 +282,17 @@ def test_least_turning_brings_the_base_to_rest() -> None:
 
 # --- the program ------------------------------------------------------------------------------------------------------
 
+MIXED = Objective({"kinetic_energy": 0.5, "torque": 0.3, "base_rotation": 0.2})
+
+
 PROGRAMS = {
     "planar, all limits": (
         ("robot=planar3r_base", "base=free", "limits=joint_torque_power", "limits.attitude=0.3"),
-        {"objective": Objective(0.5, 0.3, base_rotation=0.2), "integral_bounds": IntegralBounds(1.0, 1.0, 0.5)},
+        {"objective": MIXED, "bounds_of_integrals": {"kinetic_energy": 1.0, "torque": 1.0, "base_rotation": 0.5}},
     ),
     "planar, cycle, momentum": (
         ("robot=planar3r_base", "base=free", "base.linear_momentum=[0.1,0.2,0]", *CIRCLE, "limits=joint_torque_power"),
-        {"objective": Objective(0.0, 1.0)},
+        {"objective": Objective({"torque": 1.0})},
     ),
     "panda, all limits": (
         (
@@ -310,13 +306,13 @@ PROGRAMS = {
             ),
             *("limits=joint_torque_power", "base.angular_momentum=[0.1,0,0.2]", "robot.orientation=pointing"),
         ),
-        {"objective": Objective(0.5, 0.3, base_rotation=0.2), "integral_bounds": IntegralBounds(base_rotation=0.5)},
+        {"objective": MIXED, "bounds_of_integrals": {"base_rotation": 0.5, "velocity_norm": 3.0}},
     ),
     "panda, held": (
         ("robot=panda", "objective=reaction", "path.direction=[0,1,0]", "limits=joint_torque_power"),
         {
-            "objective": Objective(0.0, reaction_force=0.4, reaction_torque=0.6),
-            "integral_bounds": IntegralBounds(reaction_torque=2.0, torque=3.0),
+            "objective": Objective({"reaction_force": 0.4, "reaction_torque": 0.6}),
+            "bounds_of_integrals": {"reaction_torque": 2.0, "torque": 3.0},
         },
     ),
 }
@@ -331,8 +327,8 @@ def test_derivatives_of_the_whole_program(kind: str, elastic: tuple[str, ...], r
         problem = replace(problem, boundary=Boundary.FREE)
     problem = replace(problem, **changes)
     guess = problem.q_init + np.cumsum(0.05 * rng.normal(size=(14, problem.task.arm.n)), axis=0)
-    made = Transcription(problem, problem.times, guess, elastic=elastic)
-    x = 0.3 * rng.normal(size=made.program.num_vars())
+    made = transcribe(problem, problem.times, guess, elastic=elastic)
+    x = 0.3 * rng.normal(size=made.drake.num_vars())
     x[: made.y.size] = 0.03 * (guess + 0.1 * rng.normal(size=guess.shape)).ravel()
     jacobian, h = program_jacobian(made, x), 1e-6
     for _ in range(6):

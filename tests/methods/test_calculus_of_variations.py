@@ -119,7 +119,7 @@ def test_unsupported(line: Problem) -> None:
     for problem, word in (
         (replace(line, boundary=Boundary.CYCLIC), "cyclic"),
         (replace(line, limits=bounded), "limits"),
-        (replace(line, objective=Objective(0.0, 1.0)), "torque"),
+        (replace(line, objective=Objective({"torque": 1.0})), "torque"),
         (replace(line, task=PositionTask(line.task.arm, ("x",))), "redundancy"),
     ):
         with pytest.raises(InputError, match=word):

@@ -132,6 +132,6 @@ def test_minima_wrap_around_each_loop() -> None:
 
 def test_unsupported(line: Problem) -> None:
     with pytest.raises(InputError, match="first order"):
-        dynamic_programming(replace(line, objective=Objective(0.0, 1.0)), DynamicProgrammingOptions())
+        dynamic_programming(replace(line, objective=Objective({"torque": 1.0})), DynamicProgrammingOptions())
     with pytest.raises(InputError, match="does not end where it starts"):
         dynamic_programming(replace(line, boundary=Boundary.CYCLIC), DynamicProgrammingOptions())

@@ -61,9 +61,9 @@ def assert_sound(problem: Problem, motions: list[Evaluation]) -> None:
         assert (np.abs(motion.qd[1:]) <= bounds.velocity * (1 + 1e-6)).all()
         assert (np.abs(motion.tau[1:]) <= bounds.torque * (1 + 1e-6)).all()
         assert (motion.power[1:] <= bounds.power * (1 + 1e-6)).all()
-    weight = problem.objective
+    weight = problem.objective.weight
     costs = [
-        weight.kinetic_energy * motion.energy_integral[-1] + weight.torque * motion.torque_integral[-1]
+        weight("kinetic_energy") * motion.energy_integral[-1] + weight("torque") * motion.torque_integral[-1]
         for motion in motions
     ]
     assert costs == sorted(costs)

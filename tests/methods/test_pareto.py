@@ -17,10 +17,10 @@ from pipeline.evaluation.evaluation import Evaluation, evaluate
 from pipeline.methods.global_planner.planner import global_planner
 from pipeline.methods.method import Context
 from pipeline.methods.pareto import pareto
-from pipeline.problem.objective import IntegralBounds, Objective
+from pipeline.problem.objective import Objective
 from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Status
-from pipeline.program.program import Transcription
+from pipeline.program.transcription import transcribe
 from pipeline.run.main import CONF
 from pipeline.studies import front
 
@@ -41,16 +41,13 @@ def evaluations(problem: Problem) -> list[Evaluation]:
 
 @pytest.fixture(scope="module")
 def table(evaluations: list[Evaluation]) -> pd.DataFrame:
-    made = front.table(evaluations)
-    assert made is not None
-    return made
+    return front.table(evaluations)
 
 
 @pytest.mark.slow
 def test_the_ends_are_the_single_objective_optima(problem: Problem, table: pd.DataFrame) -> None:
     for name, row in (("kinetic_energy", table.iloc[0]), ("torque", table.iloc[-1])):
-        weights = {"kinetic_energy": 0.0, "torque": 0.0, name: 1.0}
-        alone = global_planner(replace(problem, objective=Objective(**weights)), FEW)[0]
+        alone = global_planner(replace(problem, objective=Objective({name: 1.0})), FEW)[0]
         found = evaluate(problem, alone)
         best = found.energy_integral[-1] if name == "kinetic_energy" else found.torque_integral[-1]
         assert row["extreme"]
@@ -93,7 +90,6 @@ def test_weighting_gives_points_that_the_epsilon_constraint_does_not_beat(
     problem: Problem, table: pd.DataFrame
 ) -> None:
     weighted = front.table([evaluate(problem, s) for s in pareto(problem, replace(OPTIONS, method="weighting"))])
-    assert weighted is not None
     assert len(weighted) == len(table)
     both = pd.concat([table, weighted])[["kinetic_energy", "torque"]].to_numpy()
     assert not front.dominated(both)[len(table) :].any()
@@ -104,8 +100,8 @@ def test_a_bounded_integral_is_met_exactly(problem: Problem) -> None:
     start = global_planner(problem, replace(FEW, optimised=2))[0].trajectory.q
     free = evaluate(problem, global_planner(problem, replace(FEW, optimised=2))[0])
     bound = 1.05 * free.energy_integral[-1]
-    stated = replace(problem, objective=Objective(0.0, 1.0), integral_bounds=IntegralBounds(kinetic_energy=bound))
-    q, outcome, _ = Transcription(stated, problem.times, start).solve()
+    stated = replace(problem, objective=Objective({"torque": 1.0}), bounds_of_integrals={"kinetic_energy": bound})
+    q, outcome, _ = transcribe(stated, problem.times, start).solve()
     assert outcome.converged
     solution = replace(free.solution, trajectory=replace(free.solution.trajectory, q=q))
     assert evaluate(problem, solution).energy_integral[-1] == pytest.approx(bound, rel=1e-6)

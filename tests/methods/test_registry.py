@@ -15,13 +15,20 @@ from pipeline.methods.method import ANY, Context, Serves
 from pipeline.methods.registry import METHODS
 from pipeline.problem.problem import Boundary
 from pipeline.problem.solution import Status
-from pipeline.run.solve import solve, state
+from pipeline.run.solve import solve
+from pipeline.run.state import state
 from tests.support import composed
 
-FEW = ("configurations=4", "candidates=30", "optimised=2", "same_path=2.0")
+FEW = ("configurations=4", "candidates=30", "optimised=4", "same_path=0.5")
 SMALL = (
     *(f"method.global.{word}" for word in FEW),
-    *("timing.steps=8", "path.length=0.15", "timing.duration=4", "method.lsv.dt=0.1", "method.inertia_weighted.dt=0.1"),
+    *(
+        "timing.steps=12",
+        "path.length=0.15",
+        "timing.duration=4",
+        "method.lsv.dt=0.1",
+        "method.inertia_weighted.dt=0.1",
+    ),
     *("method.pmke.dt=0.02", "method.pareto.steps=2", "method.pareto.rounds=0", "method.receding.update_interval=2"),
     *("method.dynamic_programming.nodes=60", "method.dynamic_programming.intervals=6"),
     *("method.calculus_of_variations.spacing=0.3", "method.calculus_of_variations.refinements=1"),
@@ -50,8 +57,8 @@ SERVED = {
     "r = 2": BASELINES | {"pontryagin", "pontryagin_as_printed"},
 }
 WHY = {  # a word of the refusal, where the problem's name is none
-    "floating": "the base moves",
-    "held": "held for its reaction",
+    "floating": "the base is floating",
+    "held": "the base is held",
     "r = 2": "the redundancy degree is 2",
 }
 

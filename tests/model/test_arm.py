@@ -14,6 +14,7 @@ from pipeline.common.arrays import Array
 from pipeline.model.arm import Arm
 from pipeline.model.stack import BLOCK
 from pipeline.robot import urdf
+from pipeline.robot.mounting import Mounting
 from tests.support import differences
 
 JOINTS = [  # type, xyz, rpy, axis: nothing is aligned with anything, one joint slides
@@ -46,7 +47,7 @@ def spatial_urdf() -> str:
 def spatial(tmp_path_factory: pytest.TempPathFactory) -> Arm:
     file = tmp_path_factory.mktemp("robot") / "spatial.urdf"
     file.write_text(spatial_urdf())
-    return Arm(urdf.read(file, "l7"), offset=(0.02, -0.01, 0.1))
+    return Arm(urdf.read(file, "l7"), Mounting(offset=(0.02, -0.01, 0.1)))
 
 
 @pytest.fixture(params=["planar", "spatial"])
@@ -67,7 +68,7 @@ class AutoDiffPlant:
         plant.WeldFrames(plant.world_frame(), plant.GetFrameByName(arm.description.base))
         plant.mutable_gravity_field().set_gravity_vector(np.zeros(3))
         plant.Finalize()
-        self.plant, self.point = plant.ToAutoDiffXd(), arm.offset.astype(object).reshape(3, 1)
+        self.plant, self.point = plant.ToAutoDiffXd(), np.array(arm.mounting.offset, dtype=object).reshape(3, 1)
         self.tip = self.plant.GetFrameByName(arm.description.end_effector)
         self.context = self.plant.CreateDefaultContext()
 

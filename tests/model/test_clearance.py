@@ -4,97 +4,24 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
 from pipeline.build.problem import prepare
-from pipeline.common.arrays import Array
 from pipeline.common.errors import ConfigError
 from pipeline.evaluation.evaluation import evaluate
 from pipeline.methods.global_planner.planner import global_planner
-from pipeline.model.arm import Arm
-from pipeline.model.clearance import Clearance, Obstacles
+from pipeline.model.clearance import Clearance
+from pipeline.model.obstacles import Obstacles
 from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Solution, Status, Trajectory
-from pipeline.robot.shapes import Shape, capsule, link_shapes
-from tests.support import ROBOTS, composed, robot, within_limits
-
-BALL = Shape("ball", "sphere", (0.06,), (0.25, 0.2, 0.3))
-ROD = capsule("rod", np.array([-0.4, 0.3, 0.1]), np.array([-0.2, 0.5, 0.7]), 0.04)
-BOX = Shape("box", "box", (0.2, 0.1, 0.3), (0.1, -0.4, 0.4), (0.3, 0.2, -0.5))
-
-
-def with_shapes(name: str) -> Arm:
-    """planar3r has no shapes of its own: capsules along its links."""
-    arm = robot(name)
-    if arm.description.collision:
-        return arm
-    rods = [
-        capsule(f"r{i}", np.zeros(3), np.array([length, 0, 0]), 0.02, f"link{i}")
-        for i, length in ((1, 0.25), (2, 0.25), (3, 0.3))
-    ]
-    links = [link for link in arm.description.links if link != arm.description.base]
-    rods = [replace(rod, frame=link) for rod, link in zip(rods, links, strict=False)]
-    return Arm(replace(arm.description, collision=tuple(rods)))
-
-
-def ends(shape: Shape, position: Array, rotation: Array) -> Array:
-    """The segment (2, 3) that a sphere or capsule surrounds, in the world."""
-    half = np.array([0, 0, (shape.size[1] if shape.kind == "capsule" else 0.0) / 2])
-    inner = Rotation.from_rotvec(shape.rotation)
-    own = [np.array(shape.position) + inner.apply(sign * half) for sign in (-1, 1)]
-    return np.array([position + rotation @ point for point in own])
-
-
-def between_segments(a: Array, b: Array) -> float:
-    """By brute force, refined: no closed form to get wrong."""
-    s = t = 0.5
-    width = 0.5
-    for _ in range(40):
-        grid = np.linspace(-width, width, 9)
-        u, v = np.clip(s + grid, 0, 1)[:, None], np.clip(t + grid, 0, 1)[None, :]
-        points = (a[0] + u[..., None] * (a[1] - a[0])) - (b[0] + v[..., None] * (b[1] - b[0]))
-        distance = np.linalg.norm(points, axis=2)
-        i, j = np.unravel_index(np.argmin(distance), distance.shape)
-        s, t, width = float(u[i, 0]), float(v[0, j]), width * 0.6
-    return float(distance.min())
+from pipeline.robot.shapes import Shape, link_shapes
+from tests.support import BALL, BOX, ROBOTS, ROD, composed, segment_distances, with_shapes, within_limits
 
 
 @pytest.mark.parametrize("name", ["planar4r", "panda", "xarm7"])
 def test_distances_equal_those_of_segments(name: str, rng: np.random.Generator) -> None:
     arm = with_shapes(name)
-    clearance = Clearance(arm, Obstacles((BALL, ROD), 0.02))
-    frames = {
-        s.frame: Arm.from_urdf(arm.description.file, str(s.frame))
-        for s in arm.description.collision
-        if s.frame != arm.description.base and s.frame in reachable(arm)
-    }
-    for q in within_limits(arm, 5, rng):
-        best = np.inf
-        for shape in arm.description.collision:
-            if shape.frame not in frames:
-                continue
-            frame = frames[shape.frame]
-            position, rotation = (value[0] for value in frame.pose(q[None, : frame.n]))
-            mine = ends(shape, position, rotation)
-            for other in (BALL, ROD):
-                gap = between_segments(mine, ends(other, np.zeros(3), np.eye(3)))
-                best = min(best, gap - shape.size[0] - other.size[0])
-        assert clearance.closest(q)[0] == pytest.approx(best, abs=2e-5)
-
-
-def reachable(arm: Arm) -> set[str]:
-    """Links whose place depends on the chain's joints alone, with at least one of them."""
-    found = set()
-    for link in arm.description.links:
-        try:
-            if (
-                Arm.from_urdf(arm.description.file, link).description.joints
-                == arm.description.joints[: Arm.from_urdf(arm.description.file, link).n]
-            ):
-                found.add(link)
-        except ValueError:
-            continue
-    return found
+    clearance, q = Clearance(arm, Obstacles((BALL, ROD), 0.02)), within_limits(arm, 5, rng)
+    np.testing.assert_allclose(clearance.smallest(q), segment_distances(arm, (BALL, ROD), q), atol=2e-5)
 
 
 @pytest.mark.parametrize(("solid", "accuracy"), [(BALL, 1e-6), (ROD, 2e-3), (BOX, 2e-3)], ids=["ball", "rod", "box"])

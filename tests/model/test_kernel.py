@@ -15,6 +15,7 @@ from pipeline.model.kernel.rows import TaskRows
 from pipeline.model.kernel.torque import inverse_dynamics
 from pipeline.model.task import PoseTask, PositionTask, Task
 from pipeline.robot import urdf
+from pipeline.robot.mounting import Mounting
 from tests.model.test_arm import AutoDiffPlant, states
 from tests.model.test_arm import spatial as spatial  # a fixture: one sliding joint, nothing aligned
 from tests.support import differences, robot
@@ -37,8 +38,7 @@ def with_sliding_joints(folder: Path) -> Arm:
         )
     file = folder / "sliding.urdf"
     file.write_text(f'<robot name="sliding">{"".join(parts)}</robot>')
-    return Arm(
-        urdf.read(file, "l6"),
+    mounting = Mounting(
         offset=(0.02, -0.01, 0.1),
         offset_rpy=(0.3, -0.2, 0.5),
         base_position=(0.1, 0.2, -0.3),
@@ -47,6 +47,7 @@ def with_sliding_joints(folder: Path) -> Arm:
         payload=1.7,
         armature=(0.1, 0.0, 0.3, 0.02, 0.5, 0.04),
     )
+    return Arm(urdf.read(file, "l6"), mounting)
 
 
 @pytest.fixture(scope="module", params=ARMS)

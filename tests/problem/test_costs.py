@@ -40,11 +40,11 @@ def test_the_integrals_are_those_that_are_reported(
     for q, result in zip(motions, reported, strict=True):
         np.testing.assert_allclose(velocities(problem, TIMES, q), result.qd, atol=1e-12)
         costs = integrals(problem, TIMES, q)
-        assert costs.kinetic_energy == pytest.approx(result.energy_integral[-1], rel=1e-10)
-        assert costs.torque == pytest.approx(result.torque_integral[-1], rel=1e-10)
+        assert costs.integrals["kinetic_energy"] == pytest.approx(result.energy_integral[-1], rel=1e-10)
+        assert costs.integrals["torque"] == pytest.approx(result.torque_integral[-1], rel=1e-10)
         np.testing.assert_allclose(costs.tau[1:], result.tau[1:], rtol=1e-9, atol=1e-9)
     for weight in (1.0, 0.3, 0.0):
-        mixed = replace(problem, objective=Objective(weight, 1.0 - weight))
+        mixed = replace(problem, objective=Objective({"kinetic_energy": weight, "torque": 1.0 - weight}))
         expected = [weight * r.energy_integral[-1] + (1 - weight) * r.torque_integral[-1] for r in reported]
         np.testing.assert_allclose(objective_values(mixed, TIMES, motions), expected, rtol=1e-10)
 

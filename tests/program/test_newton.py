@@ -79,7 +79,7 @@ def test_null_spaces_and_triangular_systems(rng: np.random.Generator) -> None:
 
 def small(boundary: Boundary, *words: str) -> Problem:
     problem = prepare(composed("robot=planar4r", "path=circle", "path.radius=0.05", "timing.steps=6", *words))
-    objective = Objective(kinetic_energy=0.7, velocity_norm=0.02)
+    objective = Objective({"kinetic_energy": 0.7, "velocity_norm": 0.02})
     return replace(problem, boundary=boundary, objective=objective)
 
 

@@ -14,6 +14,7 @@ from pipeline.common.arrays import Array
 from pipeline.common.errors import RobotError
 from pipeline.model.arm import Arm
 from pipeline.robot import urdf
+from pipeline.robot.mounting import Mounting
 from tests.robot.test_urdf import ROBOT
 
 Q = np.array([[0.7, 0.15, -1.2, 2.1], [-0.4, -0.02, 0.9, -3.0]])
@@ -102,8 +103,7 @@ def test_the_arm_is_that_of_the_urdf(write: Callable[[str, str], Path], locked: 
     frame = FRAMES["hand"]
     theirs = Arm(
         urdf.read(write("robot.urdf", ROBOT), "hand", locked=locked),
-        frame[:3, 3],
-        offset_rpy=Rotation.from_matrix(frame[:3, :3]).as_euler("xyz"),
+        Mounting(frame[:3, 3], Rotation.from_matrix(frame[:3, :3]).as_euler("xyz")),
     )
     for key in ("joints", "name"):
         assert getattr(ours.description, key) == getattr(theirs.description, key)

@@ -97,6 +97,10 @@ REFUSED = {
     "robot option": (["robot=unknown"], ["robot", "unknown", "planar3r", "planar3r_printed"]),
     "boundary option": (["boundary=closed"], ["boundary", "closed", "cyclic", "fixed", "free"]),
     "experiment": (["+experiment=traj9"], ["experiment", "traj9", "traj1", "traj4", "sim1"]),
+    "hidden option": (["robot=_common"], ["robot = _common", "no such option", "allowed: panda, planar3r"]),
+    "hidden experiment": (["-m", "+experiment=sim1,_sim"], ["experiment = _sim", "no such option"]),
+    "closest option": (["robot=pandda"], ["robot = pandda", "did you mean panda?"]),
+    "plus forgotten": (["experiment=traj3"], ["experiment=traj3", "did you mean +experiment=traj3?"]),
     "group": (["paths=line"], ["paths", "did you mean path"]),
     "key": (["sed=2"], ["sed", "did you mean seed", "methods"]),
     "appended key": (["+sed=2"], ["sed", "did you mean seed", "methods"]),
@@ -231,7 +235,7 @@ def test_an_objective_is_what_it_is_called(kind: str) -> None:
     with initialize_config_dir(CONF, version_base="1.3"):
         config = checked(compose("config", overrides=[f"objective.kind={kind}"]))
     assert config.objective.kind == kind
-    assert prepare(config).objective == Objective(**{"kinetic_energy": 0.0, "torque": 0.0, kind: 1.0})
+    assert prepare(config).objective == Objective({kind: 1.0})
 
 
 URDF = """<robot name="bad">

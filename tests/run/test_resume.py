@@ -14,13 +14,12 @@ import pandas as pd
 import pytest
 from joblib import Parallel, cpu_count, delayed, parallel_config
 
-from pipeline.artifacts.figures import motions as figures
-from pipeline.artifacts.recording import recording
 from pipeline.common import versions
 from pipeline.common.workers import Workers
 from pipeline.config.run import RunConfig
 from pipeline.problem.problem import Problem
 from pipeline.run import run as run_module
+from tests.reports import leave_out_pictures
 from tests.run.test_main import ROOT, Answer, call, command
 
 Sweep = Callable[..., Answer]
@@ -30,8 +29,7 @@ LSV = ("-m", "name=traj1", "methods=[lsv]", "timing.steps=10", "path=line", "hyd
 @pytest.fixture
 def sweep(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Sweep:
     """A sweep into the folder `all`, within this process and without pictures, which take most of the time."""
-    for module in (figures, recording):
-        monkeypatch.setattr(module, "write", lambda *_, **__: None)
+    leave_out_pictures(monkeypatch)
     monkeypatch.chdir(tmp_path)
     (tmp_path / "points.csv").write_text("x,y\n0.0,0.0\n0.0,0.05\n0.0,0.1\n", encoding="utf-8")
     return partial(call, monkeypatch, capfd, *LSV)

@@ -29,7 +29,7 @@ from pipeline.methods.method import Context
 from pipeline.methods.pmke.predictive import pmke
 from pipeline.problem.problem import Boundary, Problem
 from pipeline.problem.solution import Status
-from pipeline.run import run
+from pipeline.run.solve import solve
 from tests.run.test_main import ROOT, Answer, call, command
 from tests.support import RUN_FILES
 
@@ -162,7 +162,7 @@ class TestTraj3:
 def solved(number: int, method: str) -> tuple[Problem, list[Evaluation]]:
     config = configured(f"+experiment=traj{number}", f"methods=[{method}]", *FEW)
     problem = prepare(config)
-    solutions, seconds = run.solve(problem, config, Context(1, Workers(min(2, os.cpu_count() or 1))))
+    solutions, seconds = solve(problem, config, Context(1, Workers(min(2, os.cpu_count() or 1))))
     assert seconds[method] > 0
     return problem, [evaluate(problem, solution) for solution in solutions]
 
@@ -352,7 +352,7 @@ def test_a_value_given_overrides_the_description() -> None:
 def test_boundaries_and_objectives_arrive() -> None:
     problem = prepared("path=circle", "boundary=cyclic", "objective=weighted")
     assert problem.boundary is Boundary.CYCLIC
-    assert (problem.objective.kinetic_energy, problem.objective.torque) == (0.5, 0.5)
+    assert problem.objective.weights == {"kinetic_energy": 0.5, "torque": 0.5}
     gap = problem.reference.position(np.array([0.0, problem.reference.duration]))
     np.testing.assert_allclose(gap[0], gap[1], atol=1e-12)
 

@@ -3,6 +3,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pipeline.common.arrays import Array
+from pipeline.model import kinematics
 from pipeline.model.task import PositionTask
 from pipeline.path.curves import Line
 from pipeline.path.reference import Reference
@@ -17,6 +19,7 @@ from pipeline.path.timing import RaisedCosine
 from pipeline.problem.costs import integrals, objective_values
 from pipeline.problem.objective import Objective
 from pipeline.problem.problem import Problem
+from pipeline.search import population as population_module
 from pipeline.search.configurations import random_configurations
 from pipeline.search.population import population, random_inverse_weights
 from pipeline.search.selection import distinct, diverse, path_distance
@@ -83,7 +86,7 @@ def test_a_stretched_start_does_not_end_the_run(task: PositionTask) -> None:
 
 def test_costs_are_backward_sums(problem: Make, peer: SimpleNamespace, rng: np.random.Generator) -> None:
     times, motions = np.array([0.0, 0.1, 0.3, 0.35]), rng.normal(size=(5, 4, 3))
-    asked = replace(problem(1, 3), objective=Objective(2.0, 0.1))
+    asked = replace(problem(1, 3), objective=Objective({"kinetic_energy": 2.0, "torque": 0.1}))
     dt = np.diff(times)
     for motion, value in zip(motions, objective_values(asked, times, motions), strict=True):
         qd = np.diff(motion, axis=0) / dt[:, None]
@@ -91,7 +94,7 @@ def test_costs_are_backward_sums(problem: Make, peer: SimpleNamespace, rng: np.r
         energy, torque = peer.energy(motion[1:], qd) @ dt, (peer.torque(motion[1:], qd, qdd) ** 2).sum(axis=1) @ dt
         assert value == pytest.approx(2.0 * energy + 0.1 * torque, rel=1e-9)
         both = integrals(asked, times, motion)
-        assert (both.kinetic_energy, both.torque) == pytest.approx((energy, torque), rel=1e-9)
+        assert (both.integrals["kinetic_energy"], both.integrals["torque"]) == pytest.approx((energy, torque), rel=1e-9)
 
 
 @given(st.floats(-3, 3), st.lists(st.integers(-3, 3), min_size=2, max_size=2))
@@ -123,3 +126,21 @@ def test_diverse_takes_far_motions_before_near_ones() -> None:
     assert chosen[0] == 0
     assert {30, 31} <= set(chosen)
     assert set(distinct(motions, costs, 4, 1e-4, TURNS)) == {0, 1, 2, 3}  # the cheapest alone see one valley
+
+
+def test_motions_survive_where_the_inertia_weighted_one_is_lost(problem: Make, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first motion of every start may meet a singularity before the others do."""
+    lost = []
+
+    def project(*arguments: Any, **options: Any) -> tuple[Array, Array]:
+        q, error = kinematics.project(*arguments, **options)
+        if not lost:
+            error[0] = np.inf
+        lost.append(len(q))
+        return q, error
+
+    monkeypatch.setattr(population_module, "project", project)
+    stated = problem(1, 4)
+    found = population(stated, stated.times, stated.q_init[None], 5, np.random.default_rng(0))
+    assert lost == [5, 4, 4, 4]
+    assert found.shape == (4, 5, 3)

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from pipeline.artifacts.figures import closed_loop as closed_loop_figure
 from pipeline.build.problem import prepare
 from pipeline.config.studies import ClosedLoopConfig
 from pipeline.evaluation.evaluation import Evaluation, evaluate
@@ -17,6 +15,7 @@ from pipeline.model.arm import Arm
 from pipeline.model.task import PositionTask
 from pipeline.problem.limits import Limits
 from pipeline.problem.problem import Problem
+from pipeline.robot.mounting import Mounting
 from pipeline.studies.closed_loop import ClosedLoop, simulate
 from tests.support import composed, robot
 
@@ -114,11 +113,13 @@ def test_gravity_payload_rotors_and_a_placed_base(case: Case) -> None:
     problem, _ = case
     arm = Arm(
         robot("planar3r").description,
-        gravity=(0.0, -0.1, -9.8),
-        payload=0.1,
-        armature=0.04,
-        base_position=(0.2, 0.1, 0.3),
-        base_rpy=(0.0, 0.0, 0.4),
+        Mounting(
+            gravity=(0.0, -0.1, -9.8),
+            payload=0.1,
+            armature=0.04,
+            base_position=(0.2, 0.1, 0.3),
+            base_rpy=(0.0, 0.0, 0.4),
+        ),
     )
     task = PositionTask(arm)
     start = task.value(problem.q_init[None])[0]
@@ -138,11 +139,11 @@ def test_gravity_payload_rotors_and_a_placed_base(case: Case) -> None:
         assert np.abs(off).max() < 0.04 * np.abs(motion.tau).max()
 
 
-def test_the_picture(case: Case, tmp_path: Path) -> None:
+def test_the_picture(case: Case) -> None:
     problem, motion = case
     loop = simulate(weak(problem, 0.5 * float(np.abs(motion.tau).max())), motion, OPTIONS)
     for one in (loop, replace(loop, effort=np.full(3, np.inf))):
-        figure = closed_loop_figure.draw(one, problem, "line")
+        (figure,) = one.figures("line").values()
+        assert figure.get_suptitle() == "line: closed loop, LSV"
         assert [axes.get_ylabel() for axes in figure.axes][:2] == ["Joint error [rad]", "End-effector error [m]"]
         assert [text.get_text() for text in figure.legends[0].get_texts()] == ["joint1", "joint2", "joint3"]
-    assert closed_loop_figure.write(tmp_path, loop, problem, name="line").read_bytes().startswith(b"\x89PNG")

@@ -9,16 +9,17 @@ import pytest
 
 from pipeline.build.problem import prepare
 from pipeline.config.methods import GlobalOptions
+from pipeline.config.run import RunConfig
 from pipeline.evaluation.evaluation import Evaluation, evaluate
 from pipeline.methods.global_planner.planner import global_planner
-from pipeline.model.clearance import Obstacles
+from pipeline.model.obstacles import Obstacles
 from pipeline.path.timing import ConstantSpeed
 from pipeline.problem.limits import Limits
 from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Solution, Status, Trajectory
 from pipeline.robot.shapes import Shape
-from pipeline.studies.export import Resampled, resample, sentence
-from pipeline.studies.studies import compute
+from pipeline.studies.export import Resampled, resample, sentence, study
+from pipeline.studies.study import Motions, Result
 from tests.support import composed
 
 FEW = GlobalOptions(candidates=60, optimised=2)
@@ -128,6 +129,10 @@ def test_limits_that_are_kept_and_limits_that_are_not_there(line: Case) -> None:
 # --- which motion is sent -------------------------------------------------------------------------------------------
 
 
+def sent_by(problem: Problem, settings: RunConfig, *motions: Evaluation) -> Result | None:
+    return study(Motions(settings, problem, motions))
+
+
 def test_the_best_motion_is_the_cheapest_that_hits_nothing() -> None:
     """A method that promises no clearance goes through the ball: cheaper, and not to be sent."""
     ball = Shape("ball", "sphere", (0.04,), (0.69, 0.49, 0.0))
@@ -139,13 +144,16 @@ def test_the_best_motion_is_the_cheapest_that_hits_nothing() -> None:
     around = evaluate(there, global_planner(there, FEW)[0])
     assert through.status is around.status is Status.SOLVED
     assert through.objective < around.objective
-    sent = compute(there, config, [through, around]).exported
-    assert sent is not None
+    sent = sent_by(there, config, through, around)
+    assert isinstance(sent, Resampled)
     assert sent.method == "global"
     assert sent.limit_excess["clearance"] <= 0
-    assert compute(there, config, [through]).exported is None
+    nothing = sent_by(there, config, through)
+    assert nothing is not None
+    assert nothing.section()[0].startswith("Exported: nothing")
+    assert [nothing.columns(through), nothing.facts(), nothing.tables()] == [{}, {}, {}]
     named = composed(*words, "export.method=lsv")
-    sent = compute(there, named, [through, around]).exported
-    assert sent is not None
+    sent = sent_by(there, named, through, around)
+    assert isinstance(sent, Resampled)
     assert "exceeds the clearance limit by" in sentence(sent)
-    assert compute(there, composed(*words, "export.method=none"), [through, around]).exported is None
+    assert sent_by(there, composed(*words, "export.method=none"), through, around) is None

@@ -15,7 +15,11 @@ from pipeline.config.studies import IdentificationConfig
 from pipeline.evaluation.evaluation import evaluate
 from pipeline.methods.lsv import lsv
 from pipeline.model.arm import Arm
+from pipeline.model.base import FIXED
+from pipeline.model.floating import Floating
 from pipeline.reproduce.results import Results
+from pipeline.robot.mounting import Mounting
+from pipeline.robot.spacecraft import Spacecraft
 from pipeline.studies import identification
 from tests.support import ROOT, composed
 
@@ -59,6 +63,24 @@ def test_other_masses_change_the_dynamics_and_nothing_else(as_printed: Arm, rng:
     assert np.all(np.abs(as_printed.mass_matrix(q)[:, 0, 0] / own.mass_matrix(q)[:, 0, 0] - 1) > 0.1)
     np.testing.assert_allclose(identification.masses_of(changed.description), IDENTIFIED)
     np.testing.assert_allclose(identification.masses_of(as_printed.description), PRINTED)
+
+
+def test_other_masses_leave_mounting_and_base(as_printed: Arm, rng: np.random.Generator) -> None:
+    """Payload, rotors, place and gravity, and a spacecraft under the arm, stay when masses are replaced."""
+    mounting = Mounting(
+        (0.01, 0.0, 0.02), (0.1, 0.0, 0.2), (0.3, -0.2, 0.1), (0.0, 0.1, 0.4), (0.0, 1.0, -9.8), 0.3, 0.02
+    )
+    craft = Spacecraft(9.0, ((0.3, 0.0, 0.0), (0.0, 0.3, 0.0), (0.0, 0.0, 0.5)), (0.0, 0.0, 0.1))
+    own = Arm.from_urdf(ROOT / "robots" / "planar3r.urdf", "tip").description
+    for base in (FIXED, Floating(craft)):
+        changed = identification.with_masses(Arm(as_printed.description, mounting, base), IDENTIFIED)
+        assert changed.mounting == mounting
+        assert changed.base == base
+        expected = Arm(own, mounting, base)
+        q, qd, qdd = rng.normal(size=(3, 5, expected.n))
+        np.testing.assert_allclose(changed.position(q), expected.position(q), atol=1e-12)
+        tau = expected.inverse_dynamics(q, qd, qdd)
+        np.testing.assert_allclose(changed.inverse_dynamics(q, qd, qdd), tau, atol=1e-10)
 
 
 def test_numbers_are_those_of_the_evaluation() -> None:

@@ -8,12 +8,14 @@ import pandas as pd
 import pytest
 
 from pipeline.common.arrays import Array
+from pipeline.config.run import RunConfig
 from pipeline.evaluation.evaluation import Evaluation, evaluate
 from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Solution, Status, Trajectory
 from pipeline.search.population import population
 from pipeline.search.selection import distinct
-from pipeline.studies.validation import table
+from pipeline.studies import validation
+from pipeline.studies.study import Motions
 
 Make = Callable[[int, int], Problem]
 ENERGIES = {"minimum": 0.05, "saddle": 0.07}
@@ -43,6 +45,10 @@ def stationary(problem: Problem, q: Array, optimum: int = 1, kind: str = "minimu
         "calculus_of_variations", Trajectory(problem.times, q), Status.SOLVED, "", optimum, statistics=facts
     )
     return evaluate(problem, solution)
+
+
+def table(problem: Problem, motions: list[Evaluation]) -> pd.DataFrame:
+    return validation.table(Motions(RunConfig(), problem, motions))
 
 
 def test_pairs_are_made_by_path_not_by_rank(line: Problem, paths: list[Array]) -> None:

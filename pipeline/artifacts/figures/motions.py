@@ -1,21 +1,16 @@
-"""The figures of one run as PNG files: the content of the PMKE paper's Figs 2-12, for any arm and any set of motions.
+"""The figures of the motions over time: the content of the PMKE paper's Figs 2-12, for any arm and any set of motions.
 
-Each public function below draws one figure from the evaluations and returns it; `write` puts them all into a folder.
 What a singular motion does after its singularity is drawn faint and dotted: it is not to be used.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
-from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from pipeline.artifacts import style
 from pipeline.artifacts.figures.panels import (
-    DPI,
     add_legend,
     annotate,
     by_joint,
@@ -26,23 +21,10 @@ from pipeline.artifacts.figures.panels import (
     unit_of,
     usable,
 )
-from pipeline.artifacts.figures.stroboscopic import stroboscopic
 from pipeline.common.arrays import Array
-from pipeline.common.files import write_beside
 from pipeline.evaluation.evaluation import Evaluation
 from pipeline.problem.problem import Problem
-
-
-def write(folder: Path, problem: Problem, evaluations: Sequence[Evaluation], *, name: str) -> list[Path]:
-    """Draw the seven figures of a run into `folder`; returns the files."""
-    folder.mkdir(parents=True, exist_ok=True)
-    files = []
-    for draw in (reference, energy, stroboscopic, joints, torques, spectral_radius, tracking):
-        file = folder / f"{draw.__name__}.png"
-        figure = draw(problem, evaluations, name)
-        write_beside(file, partial(figure.savefig, format="png", dpi=DPI))
-        files.append(file)
-    return files
+from pipeline.studies import style
 
 
 def reference(problem: Problem, evaluations: Sequence[Evaluation], name: str) -> Figure:
@@ -77,7 +59,7 @@ def energy(problem: Problem, evaluations: Sequence[Evaluation], name: str) -> Fi
 
 
 def joints(problem: Problem, evaluations: Sequence[Evaluation], name: str) -> Figure:
-    """Joint positions with their limits, and velocities (PMKE paper Figs 4-7, 9-12, below; Pontryagin report Figs 3-7 a)."""
+    """Joint positions with their limits, and velocities (PMKE paper Figs 4-7, 9-12; Pontryagin report Figs 3-7 a)."""
     position, velocity = unit_of(problem, "rad", "m"), unit_of(problem, "rad/s", "m/s")
     return by_joint(
         f"{name}: joint positions and velocities",
@@ -156,4 +138,4 @@ def _ranges(problem: Problem) -> Array:
     bounds, secondary = problem.bounds, problem.objective.secondary
     if secondary is not None and "joint_centering" in secondary.criteria:
         return np.array([secondary.lower, secondary.upper])
-    return np.array([bounds.lower, bounds.upper])[:, problem.task.arm.base_coordinates :]
+    return np.array([bounds.lower, bounds.upper])[:, problem.task.arm.joints]

@@ -13,20 +13,13 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
-from pipeline.artifacts import style
 from pipeline.common.arrays import Array
 from pipeline.evaluation.evaluation import Evaluation
 from pipeline.problem.problem import Problem
-
-DPI = 130
-
+from pipeline.studies import style
 
 POINTS = 1001  # most points per line: more than a screen shows
-
-
 COLUMNS = 5  # most panels side by side
-
-
 INK, PALE, EVENT, PATH = "#1A202C", "#D5D9DF", "#C53030", "#B83280"
 
 

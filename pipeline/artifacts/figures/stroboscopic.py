@@ -12,14 +12,13 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
-from pipeline.artifacts import style
 from pipeline.artifacts.figures import solids
 from pipeline.artifacts.figures.panels import EVENT, INK, PALE, PATH, new_figure, shape_of, thin, tidy
 from pipeline.artifacts.scene import outlines
 from pipeline.evaluation.evaluation import Evaluation
-from pipeline.model.base import FloatingArm
 from pipeline.model.task import AXES
 from pipeline.problem.problem import Problem
+from pipeline.studies import style
 
 POSES = 18  # of one stroboscopic view
 
@@ -31,7 +30,7 @@ def stroboscopic(problem: Problem, evaluations: Sequence[Evaluation], name: str)
     """The arm in poses equally spaced in time (Figs 4-7 and 9-12, top): in its plane, or in space."""
     points = np.concatenate([e.skeleton.reshape(-1, 3) for e in evaluations])
     arm = problem.task.arm
-    edges = [outlines(arm, e.base) for e in evaluations] if isinstance(arm, FloatingArm) and arm.floats else []
+    edges = [outlines(arm, e.base) for e in evaluations] if arm.base.kind == "floating" else []
     points = np.concatenate([points, *(edge.reshape(-1, 3) for edge in edges)])
     low, high = np.nanmin(points, axis=0), np.nanmax(points, axis=0)
     size = high - low

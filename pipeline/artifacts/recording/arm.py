@@ -51,8 +51,8 @@ def draw_arm(
     q: Array,
     base: tuple[Array, Array] | None = None,
 ) -> None:
-    """The arm's picture at q (K, n) on the time line, below the entity `root`; base: the root link's positions (K, 3) and
-    rotations (K, 3, 3) where it moves.
+    """The arm's picture at q (K, n) on the time line, below the entity `root`; base: the root link's positions (K, 3)
+    and rotations (K, 3, 3) where it moves.
     """
     description = arm.description
     try:
@@ -82,8 +82,8 @@ def draw_arm(
             solid = getattr(rr, shape).from_fields(colors=[color], fill_mode="solid")
             recording.log(entity, solid, static=True)
     stand = rr.Transform3D(
-        translation=arm.base_position,
-        quaternion=Rotation.from_euler("xyz", arm.base_rpy).as_quat(),
+        translation=arm.mounting.base_position,
+        quaternion=Rotation.from_euler("xyz", arm.mounting.base_rpy).as_quat(),
         parent_frame="tf#/",
         child_frame=f"{root}/{description.base}",
     )
@@ -118,7 +118,7 @@ def _shapes(chunks: Iterable[Any]) -> set[tuple[str, str]]:
 
 
 def _rigid(xml: str, moving: Sequence[str], root: str) -> Iterator[tuple[str, Any]]:
-    """The joints that do not move, from the reduced URDF: there, locked ones stand at the positions they are locked at."""
+    """The joints that do not move, from the reduced URDF: there, locked ones stand where they are locked."""
     for joint in ET.fromstring(xml).findall("joint"):
         name, origin, parent, child = joint.get("name", ""), *map(joint.find, ("origin", "parent", "child"))
         if name in moving or parent is None or child is None:

@@ -9,8 +9,8 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from pipeline.artifacts import style
 from pipeline.common.arrays import Array
+from pipeline.studies import style
 
 BACKGROUND = (255, 255, 255)  # the colours of style.py are made for white
 
@@ -48,15 +48,15 @@ def build(
     revolute: Sequence[bool],
     planar: bool,
     ranges: Mapping[str, tuple[float, float]],
-    picture: bool = False,
+    picture: str = "",
     floats: bool = False,
 ) -> rrb.Blueprint:
     """The layout for the motions `labels`; the cameras take in `points` (P, 3) [m], all of the scene.
 
     revolute: (n,) which joints turn; it decides on the units in the titles.
     ranges: the lowest and highest value to show of an entity such as `kinetic_energy`; others show all there is.
-    picture: whether there is one, to be shown in the first tab. With more than MANY motions the first and the last are
-    shown, and the panel on the left is open, where the eye beside each motion shows or hides it.
+    picture: the title of one that is shown in the first tab, if any. With more than MANY motions the first and the last
+    are shown, and the panel on the left is open, where the eye beside each motion shows or hides it.
     """
     hidden = labels[1:-1] if len(labels) > MANY else []
     arms = _space(labels, points, planar, hidden)
@@ -64,7 +64,7 @@ def build(
         arms = rrb.Tabs(_plane(labels, points, hidden), arms, name="Arms")
     summary = rrb.TextDocumentView(origin="/summary", name="Summary")
     if picture:
-        summary = rrb.Tabs(rrb.Spatial2DView(origin="/picture", name="Front"), summary)
+        summary = rrb.Tabs(rrb.Spatial2DView(origin="/picture", name=picture), summary)
     compared = {
         entity: _compare(labels, entity, title, ranges.get(entity))
         for entity, title in (ENERGIES | CHECKS | FLOATING).items()

@@ -9,11 +9,11 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from pipeline.artifacts import style
 from pipeline.artifacts.recording.arm import columns, draw_arm, strict
 from pipeline.artifacts.recording.blueprint import BACKGROUND, GRID, pixels
 from pipeline.common.arrays import Array
 from pipeline.model.arm import Arm
+from pipeline.studies import style
 
 COLOR = (70, 120, 170, 255)
 
@@ -23,7 +23,7 @@ def write(file: Path, arm: Arm, time: Array, q: Array, *, name: str) -> None:
     file.parent.mkdir(parents=True, exist_ok=True)
     temporary = file.with_name(f"{file.name}.tmp")
     tip = arm.position(q)
-    around = np.vstack([tip, arm.base_position])
+    around = np.vstack([tip, arm.mounting.base_position])
     center = (around.min(axis=0) + around.max(axis=0)) / 2
     size = float(np.linalg.norm(around - center, axis=1).max())
     eye = center + 2.2 * size * np.array([1.0, -1.2, 0.7]) / np.linalg.norm([1.0, -1.2, 0.7])

@@ -1,7 +1,7 @@
 """The picture of an arm for a viewer: its URDF with meshes that are there, by absolute names, and not too many bytes.
 
-A mesh that is missing, or whose package is not known, is left out and noted; where a link's collision shapes can stand in,
-they do. Big pictures (over LARGE bytes of meshes) give way to simpler ones: a recording holds one per motion.
+A mesh that is missing, or whose package is not known, is left out and noted; where a link's collision shapes can stand
+in, they do. Big pictures (over LARGE bytes of meshes) give way to simpler ones: a recording holds one per motion.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ SHOWN = (".stl", ".obj", ".dae", ".glb", ".gltf")
 
 
 def picture(description: Description) -> tuple[str, list[str]]:
-    """A URDF with visuals only, and one note for all that is missing; the names of its links and joints are the file's."""
+    """A URDF with visuals only, and one note for all that is missing; its links and joints have the file's names."""
     if description.file.suffix == ".sdf":
         return "", ["an SDF file's pictures are not drawn"]
     root = ET.fromstring(description.file.read_bytes())

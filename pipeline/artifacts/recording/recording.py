@@ -18,32 +18,42 @@ import rerun as rr
 from rerun.chunk import RrdReader
 from scipy.spatial.transform import Rotation
 
-from pipeline.artifacts import style
 from pipeline.artifacts.figures.solids import outline
 from pipeline.artifacts.recording import blueprint
 from pipeline.artifacts.recording.arm import columns, draw_arm, strict
 from pipeline.artifacts.recording.blueprint import faded, pixels, rgba, slug
+from pipeline.artifacts.report import Report
 from pipeline.artifacts.scene import box, corners, outlines
+from pipeline.artifacts.summary import text
 from pipeline.common.arrays import Array
 from pipeline.evaluation.evaluation import Evaluation
-from pipeline.model.base import FloatingArm
+from pipeline.model.arm import Arm
 from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Status
 from pipeline.robot.shapes import Shape
+from pipeline.studies import style
 
 POSES = 12  # of the stroboscopic picture
-
-
 SOLID = 110  # opacity of the arms, of 255: those behind must shine through
-
-
 REFERENCE = (190, 190, 190)
-
-
 OBSTACLE = (200, 70, 60, 255)
 
 
-def write(
+def write(report: Report, folder: Path) -> None:
+    """recording.rrd in `folder`: all motions, with the figure that a study has chosen to open it."""
+    cover = next((result.cover for result in report.results if result.cover), None)
+    save(
+        folder / "recording.rrd",
+        report.motions.problem,
+        report.motions.evaluations,
+        name=report.motions.config.name,
+        summary=text(report),
+        properties={key: value for key, value in report.facts.items() if key != "inputs"},
+        picture=None if cover is None else folder / "figures" / f"{cover}.png",
+    )
+
+
+def save(
     file: Path,
     problem: Problem,
     evaluations: Sequence[Evaluation],
@@ -51,24 +61,24 @@ def write(
     name: str,
     summary: str,
     properties: Mapping[str, Any],
-    front: Path | None = None,
+    picture: Path | None = None,
 ) -> None:
     """Write the recording `file` (.rrd) of all `evaluations`, or raise and leave nothing behind.
 
     summary: Markdown, shown beside the plots. properties: facts of the run, stored as the recording's property `run`.
-    front: a PNG to show first, such as the Pareto front (2-D views have no axes of their own).
+    picture: a PNG to show first, such as the Pareto front (2-D views have no axes of their own).
     """
     temporary = file.with_name(f"{file.name}.tmp")
     try:
         with strict(), rr.RecordingStream("selfmotion") as recording:
-            recording.save(temporary, default_blueprint=_layout(problem, evaluations, front is not None))
+            recording.save(temporary, default_blueprint=_layout(problem, evaluations, picture))
             recording.send_recording_name(name)
             if facts := _facts(properties):
                 recording.send_property("run", facts)
             document = rr.TextDocument(summary, media_type=rr.MediaType.MARKDOWN)
             recording.log("summary", document, static=True)
-            if front is not None:
-                recording.log("picture", rr.EncodedImage(path=front), static=True)
+            if picture is not None:
+                recording.log("picture", rr.EncodedImage(path=picture), static=True)
             _send_reference(recording, problem)
             if problem.obstacles is not None:
                 send_obstacles(recording, problem.obstacles.shapes, _planar(problem))
@@ -95,24 +105,25 @@ def read_series(file: Path, entity: str) -> tuple[Array, Array]:
     return time[order], value[order]
 
 
-def _layout(problem: Problem, evaluations: Sequence[Evaluation], front: bool) -> Any:
-    points = [problem.task.arm.base_position[None], _reference(problem)]
+def _layout(problem: Problem, evaluations: Sequence[Evaluation], picture: Path | None) -> Any:
+    points = [np.array([problem.task.arm.mounting.base_position]), _reference(problem)]
     if problem.obstacles is not None:
         points.append(np.array([shape.position for shape in problem.obstacles.shapes]))
     points += [evaluation.skeleton[_finite(evaluation)].reshape(-1, 3) for evaluation in evaluations]
     arm = problem.task.arm
-    floats = isinstance(arm, FloatingArm) and arm.floats
-    if isinstance(arm, FloatingArm) and floats:
+    floats = arm.base.kind == "floating"
+    if floats:
         points += [corners(arm, e.base)[_finite(e)].reshape(-1, 3) for e in evaluations]
     labels = [evaluation.label for evaluation in evaluations]
     revolute = problem.task.arm.description.turning.tolist()
+    tab = "" if picture is None else picture.stem.replace("_", " ").capitalize()
     return blueprint.build(
-        labels, np.concatenate(points), revolute, _planar(problem), _ranges(evaluations), front, floats
+        labels, np.concatenate(points), revolute, _planar(problem), _ranges(evaluations), tab, floats
     )
 
 
 def _ranges(evaluations: Sequence[Evaluation]) -> dict[str, tuple[float, float]]:
-    """What to show of the energies: a motion that met a singularity shoots up there and would flatten all the others."""
+    """What to show of the energies: a motion that met a singularity shoots up there and would flatten the others."""
     usable = [evaluation for evaluation in evaluations if evaluation.status is Status.SOLVED]
     ranges = {}
     for entity in blueprint.ENERGIES if 0 < len(usable) < len(evaluations) else ():
@@ -216,7 +227,7 @@ def _send_motion(recording: Any, problem: Problem, evaluation: Evaluation) -> No
         poses = rr.LineStrips2D(list(flat[chosen]), colors=faded(label, 0.3), radii=pixels(0.8), draw_order=10.0)
         recording.log(f"{root}/poses", poses, static=True)
         arm = problem.task.arm
-        if isinstance(arm, FloatingArm) and arm.floats:
+        if arm.base.kind == "floating":
             edges = rr.LineStrips2D.columns(strips=list(_flat(outlines(arm, evaluation.base)[rows])))
             look = {"colors": rgba(label), "radii": pixels(1.5), "draw_order": 45.0}
             recording.log(f"{root}/spacecraft", rr.LineStrips2D.from_fields(**look), static=True)
@@ -232,7 +243,7 @@ def _send_stick(
     kinds: tuple[Any, Any],
     extra: dict[str, Any],
 ) -> None:
-    """The stick figure (K, n + 1, 2 or 3), its joints, and the end effector with its trace; `kinds`: lines and points."""
+    """The stick figure (K, n + 1, 2 or 3), its joints, the end effector with its trace; `kinds`: lines and points."""
     lines, dots = kinds
     tip, count = skeleton[:, -1], skeleton.shape[1]
     shown = {"colors": rgba(label), **extra}
@@ -258,7 +269,7 @@ def _send_arm(recording: Any, problem: Problem, evaluation: Evaluation, time: li
     poses = (evaluation.base.position[rows], evaluation.base.rotation[rows]) if moving else None
     arm, root = problem.task.arm, slug(evaluation.label)
     draw_arm(recording, arm, root, rgba(evaluation.label, SOLID), time, q, poses)
-    if isinstance(arm, FloatingArm) and moving and arm.spacecraft.mass > 0:
+    if moving and arm.base.spacecraft.mass > 0:
         _send_spacecraft(recording, arm, root, evaluation.label)
 
 
@@ -285,7 +296,7 @@ def send_obstacles(recording: Any, shapes: Sequence[Shape], planar: bool) -> Non
         recording.log(f"obstacles/{slug(shape.name)}", solid, static=True)
 
 
-def _send_spacecraft(recording: Any, arm: FloatingArm, root: str, label: str) -> None:
+def _send_spacecraft(recording: Any, arm: Arm, root: str, label: str) -> None:
     """The box that stands for the spacecraft, in the frame of the root link."""
     shape = box(arm)
     solid = rr.Boxes3D(

@@ -10,13 +10,15 @@ from scipy.interpolate import CubicSpline
 
 from pipeline.common.arrays import Array
 from pipeline.config.methods import GlobalOptions
-from pipeline.model.clearance import Clearance, Obstacles
-from pipeline.problem.costs import SECOND_ORDER, objective_values
+from pipeline.model.clearance import Clearance
+from pipeline.model.obstacles import Obstacles
+from pipeline.problem.costs import objective_values
+from pipeline.problem.integrals import of_order
 from pipeline.problem.lagrangian import Lagrangian
 from pipeline.problem.objective import Objective
 from pipeline.problem.problem import Problem
 from pipeline.program.feasibility import violations
-from pipeline.program.program import Transcription
+from pipeline.program.transcription import transcribe
 
 # What a coarse grid's optimum needs to be told apart and refined; only the last grid's is reported.
 ROUGH_TOLERANCE = 1e-4
@@ -63,7 +65,7 @@ def first_order(problem: Problem) -> Problem:
     if not problem.objective.second_order and not _limits_torque(problem):
         return problem
     quadratic = Lagrangian(problem.task, problem.objective).is_quadratic
-    only = replace(problem.objective, torque=0.0, reaction_force=0.0, reaction_torque=0.0)
+    only = replace(problem.objective, weights=of_order(problem.objective.weights, 1))
     return replace(_without_torque_limits(problem), objective=only if quadratic else Objective())
 
 
@@ -122,7 +124,7 @@ def _optimise_lazily(
     """As `optimise`; but where torque limits alone bring torques in and the guess keeps them, it is tried without."""
     if (
         problem.objective.second_order
-        or problem.integral_bounds.bounds(*SECOND_ORDER)
+        or of_order(problem.bounds_of_integrals, 2)
         or not _limits_torque(problem)
         or not keeps_torque_limits(problem, times, guess)
     ):
@@ -135,7 +137,7 @@ def _optimise_lazily(
 
 
 def optimise(problem: Problem, times: Array, guess: Array, options: GlobalOptions, keep_off: float = 0.0) -> Optimum:
-    program = Transcription(problem, times, guess, keep_off=keep_off)
+    program = transcribe(problem, times, guess, keep_off=keep_off)
     last = len(times) == len(problem.times)
     q, outcome, iterations = program.solve(
         tolerance=options.tolerance if last else max(options.tolerance, ROUGH_TOLERANCE),

@@ -45,7 +45,9 @@ ELASTIC_STARTS = 3  # from how many motions IPOPT seeks a motion, and the least 
 FEWER = 12  # starts on a finer grid after none succeeded on the coarse one
 
 
-FEW_STEPS = 12  # intervals of the coarsest grid of a base that moves: its starts are a population, whose size grows with it
+FEW_STEPS = (
+    12  # intervals of the coarsest grid of a base that moves: its starts are a population, whose size grows with it
+)
 
 
 HOPELESS = 0.1  # relative violation on a coarse grid from which on finer ones are not tried
@@ -53,7 +55,7 @@ HOPELESS = 0.1  # relative violation on a coarse grid from which on finer ones a
 
 def solve(problem: Problem, options: GlobalOptions, context: Context) -> list[Solution]:
     """All distinct optima found, best first."""
-    moves = problem.task.arm.base_coordinates > 0
+    moves = problem.task.arm.base.count > 0
     grids = refinement(problem.times, min(options.coarse_steps, FEW_STEPS) if moves else options.coarse_steps)
     motions, log = _starts(problem, grids[0], options, np.random.default_rng(context.seed))
     if not len(motions):
@@ -136,7 +138,7 @@ def _starts(
     log: dict[str, Any] = {}
     revolute = problem.task.arm.description.revolute
     wanted = STARTS[options.starts]
-    if "roadmap" in wanted and problem.task.arm.base_coordinates:
+    if "roadmap" in wanted and problem.task.arm.base.count:
         wanted = ("population",)
         log["roadmap"] = "not for a base that moves or is held: population instead"
     if "roadmap" in wanted:

@@ -11,22 +11,21 @@ from pipeline.problem.costs import objective_values
 from pipeline.problem.objective import Objective
 from pipeline.problem.problem import Problem
 from pipeline.program import ipopt
-from pipeline.program.program import Transcription
+from pipeline.program.transcription import transcribe
 
 MOST_ITERATIONS = 120
 
 
 def window_objective(problem: Problem, named: str) -> Objective:
     """What a window minimises: the problem's objective, or the one `named` kinetic_energy or torque."""
-    own = {"kinetic_energy": Objective(), "torque": Objective(0.0, 1.0)}
-    return own.get(named, problem.objective)
+    return problem.objective if named == "problem" else Objective({named: 1.0})
 
 
 def solve_window(
     problem: Problem, times: Array, guess: Array, tolerance: float
 ) -> tuple[Array, float, ipopt.Outcome, int]:
     """The motion (h + 1, n) of least objective from problem.q_init and qd_init over the knots `times`; guess (h + 1, n)."""
-    program = Transcription(problem, times, guess)
+    program = transcribe(problem, times, guess)
     q, outcome, iterations = program.solve(tolerance=tolerance, max_iterations=MOST_ITERATIONS)
     return q, float(objective_values(problem, times, q[None])[0]), outcome, iterations
 
@@ -42,5 +41,5 @@ def rollout(problem: Problem, q: Array, targets: Array) -> Array:
 
 def path_weight(arm: Arm, q: Array) -> Array | None:
     """For `project` from q (K, n): least joint displacements, the base following them; None: it stands still."""
-    joints = arm.n - arm.base_coordinates
-    return arm.lift(q, np.tile(np.eye(joints), (len(q), 1, 1))) if arm.base_coordinates else None
+    joints = arm.n - arm.base.count
+    return arm.lift(q, np.tile(np.eye(joints), (len(q), 1, 1))) if arm.base.count else None

@@ -95,7 +95,7 @@ class _Predictor:
         self.objective = window_objective(problem, options.objective)
         lagrangian = Lagrangian(problem.task, self.objective)
         # The small program knows objectives of first order, and no momentum.
-        self.lifted = options.objective == "torque" or bool(problem.task.arm.base_coordinates)
+        self.lifted = options.objective == "torque" or bool(problem.task.arm.base.count)
         if not lagrangian.is_quadratic:
             lagrangian = Lagrangian(problem.task, Objective())
         self.program = None if self.lifted else Window(lagrangian, horizon, self.step)

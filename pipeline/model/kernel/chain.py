@@ -81,7 +81,7 @@ class Chain:
     @classmethod
     def of(cls, arm: Arm) -> Chain:
         """The chain of an arm on a fixed base, out of Drake's plant."""
-        stack = Stack(arm, 1)
+        stack = Stack(arm.description, arm.mounting, 1)
         plant, context = stack.plant, stack.context
         plant.SetPositions(context, np.zeros(stack.n))
         single = (joint for joint in map(plant.get_joint, plant.GetJointIndices()) if joint.num_positions() == 1)

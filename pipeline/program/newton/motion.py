@@ -67,7 +67,7 @@ class Motions:
     def __init__(self, chain: Chain, task: Task, objective: Objective, knots: Knots, x_ref: Array) -> None:
         self.chain, self.knots, self.rows = chain, knots, TaskRows(chain, task)
         self.n, self.m = chain.n, task.m
-        self.inertia, self.norm = objective.kinetic_energy, objective.velocity_norm
+        self.inertia, self.norm = objective.weight("kinetic_energy"), objective.weight("velocity_norm")
         self.target = x_ref[knots.first : knots.first + knots.count]
 
     def _flat(self, x: Array, begin: Array) -> tuple[Array, Array, Array]:

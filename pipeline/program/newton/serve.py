@@ -6,7 +6,6 @@ import numpy as np
 
 from pipeline.common.arrays import Array
 from pipeline.model.kernel.chain import Chain
-from pipeline.problem.objective import INTEGRALS
 from pipeline.problem.problem import Problem
 from pipeline.program.newton.knots import Knots
 from pipeline.program.newton.motion import Motions
@@ -23,11 +22,12 @@ def why_not(problem: Problem) -> str | None:
     """
     objective, bounds = problem.objective, problem.bounds
     reasons = {
-        "a base that moves or is held": bool(problem.task.arm.base_coordinates),
+        "a base that moves or is held": problem.task.arm.base.count > 0,
         "torques or reactions in the objective": objective.second_order,
         "a secondary criterion": objective.secondary is not None,
-        "no velocity in the objective": objective.kinetic_energy == 0 and objective.velocity_norm == 0,
-        "bounds on integrals": problem.integral_bounds.bounds(*INTEGRALS),
+        "no velocity in the objective": not objective.weight("kinetic_energy")
+        and not objective.weight("velocity_norm"),
+        "bounds on integrals": bool(problem.bounds_of_integrals),
         "torque or power limits": bool(np.isfinite(bounds.torque).any() or np.isfinite(bounds.power).any()),
         "obstacles": problem.obstacles is not None,
         "so few intervals": len(problem.times) <= FEWEST,

@@ -49,7 +49,7 @@ def test_a_window_knows_the_velocity_it_comes_with() -> None:
     step = np.diff(q, axis=0) / 0.2
     qdd = np.diff(np.vstack([speed, step]), axis=0) / 0.2
     tau = asked.task.arm.inverse_dynamics(q[1:], step, qdd)
-    assert integrals(moving, times, q).torque == pytest.approx(0.2 * (tau**2).sum(), rel=1e-12)
+    assert integrals(moving, times, q).integrals["torque"] == pytest.approx(0.2 * (tau**2).sum(), rel=1e-12)
 
 
 def test_torque_as_the_objective_of_the_predictions_costs_less_torque() -> None:
@@ -59,7 +59,7 @@ def test_torque_as_the_objective_of_the_predictions_costs_less_torque() -> None:
     assert interpolated.status is Status.SOLVED
     by_energy = evaluate(asked, receding(asked, WINDOW)[0])
     by_torque = evaluate(asked, receding(asked, replace(WINDOW, objective="torque"))[0])
-    best = evaluate(asked, global_planner(replace(asked, objective=Objective(0.0, 1.0)))[0])
+    best = evaluate(asked, global_planner(replace(asked, objective=Objective({"torque": 1.0})))[0])
     assert by_torque.status is by_energy.status is Status.SOLVED
     assert best.torque_integral[-1] * 0.9 < by_torque.torque_integral[-1] < 0.8 * by_energy.torque_integral[-1]
     assert by_torque.energy_integral[-1] > by_energy.energy_integral[-1]

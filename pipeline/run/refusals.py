@@ -1,0 +1,93 @@
+"""What Hydra and OmegaConf refuse, in one line: the key or option, what is allowed, and the closest name."""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from hydra import compose, initialize_config_dir
+from hydra.core.global_hydra import GlobalHydra
+from hydra.errors import HydraException, MissingConfigException, OverrideParseException
+from omegaconf import DictConfig, OmegaConf
+from omegaconf.errors import OmegaConfBaseException
+
+from pipeline.common.errors import ConfigError
+from pipeline.common.files import shipped
+from pipeline.config.messages import unknown_key, unknown_option
+from pipeline.config.options import HIDDEN, chosen, options
+
+UNKNOWN = r"Could not (?:override|append to config\.?[^']*|find) '([^']+)'"
+GROUP = r"\+?[a-z_/]+=[\w,]+"  # a word that may pick an option
+
+
+def refuse(words: Sequence[str]) -> None:
+    """Raise ConfigError for what Hydra takes without a word: a deleted option, or one only there to be inherited from."""
+    for word in words:
+        if word.startswith("~") and _deletes_an_option(word):
+            raise ConfigError(f"{word}: options cannot be deleted, only entries of tables; give it another value")
+        group, _, option = word.lstrip("+").partition("=")
+        hidden = [name for name in option.split(",") if name.startswith(HIDDEN)]
+        if hidden and options(group):
+            raise ConfigError(unknown_option(group, hidden[0], sorted(options(group))))
+
+
+def _deletes_an_option(word: str) -> bool:
+    """Whether `~key` would take the default in place of what the files say."""
+    from pipeline.config.run import RunConfig
+
+    found = re.fullmatch(r"~(\w[\w./]*)(@.*)?(=.*)?", word)
+    if found is None:
+        return False
+    first, *rest = found.group(1).replace("/", ".").split(".")
+    value: Any = RunConfig()
+    if not hasattr(value, first):
+        return False
+    for part in (first, *rest):
+        if value is None or isinstance(value, Mapping):
+            return False  # an entry of a table, such as robot.locked
+        value = getattr(value, part, value)
+    return True
+
+
+def in_one_line(error: Exception) -> str:
+    """The line for an error of composition."""
+    if isinstance(error, MissingConfigException) and error.missing_cfg_file:
+        group, _, option = error.missing_cfg_file.rpartition("/")
+        allowed = sorted(name for name in error.options or [] if not name.startswith(HIDDEN))
+        return unknown_option(group or "config", option, allowed)
+    message = str(error.__cause__ or error)
+    if isinstance(error, OverrideParseException):
+        message = f"in {' '.join(sys.argv[1:])}: {error}"
+    unknown = re.search(UNKNOWN, str(error))
+    if unknown:
+        key = unknown.group(1)
+        return _without_its_plus(key) or unknown_key(key, _keys_beside(key))
+    return " ".join(line.strip() for line in message.splitlines() if line.strip() and not line.startswith("See http"))
+
+
+def _without_its_plus(key: str) -> str:
+    """The line for a group that nothing is picked from unless it is added, such as `experiment=traj3`."""
+    if key in chosen() or not options(key):
+        return ""
+    word = next((word for word in sys.argv[1:] if word.startswith(f"{key}=")), f"{key}=...")
+    return f"{word}: no option stands there yet; did you mean +{word}?"
+
+
+def _keys_beside(key: str) -> list[str]:
+    """The keys that may stand where `key` does not: those of the composed configuration at the same place."""
+    words = [word for word in sys.argv[1:] if re.fullmatch(GROUP, word) and word.split("=")[0] != key]
+    GlobalHydra.instance().clear()
+    with initialize_config_dir(str(shipped("conf")), version_base="1.3"):
+        try:
+            composed = compose("config", overrides=words)
+        except (HydraException, OmegaConfBaseException):
+            composed = compose("config")
+    parent, _, _ = key.rpartition(".")
+    while parent:
+        there = OmegaConf.select(composed, parent)
+        if isinstance(there, DictConfig):
+            return [str(name) for name in there if name != "kind"]
+        parent = parent.rpartition(".")[0]
+    return [str(name) for name in composed]
