@@ -6,15 +6,13 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
-import casadi as ca
 import numpy as np
 import pytest
-from hydra.core.global_hydra import GlobalHydra
 from hypothesis import settings
 
 from pipeline.common.arrays import Array
-from pipeline.config import documents
 from pipeline.model.arm import Arm
 from pipeline.model.kinematics import project
 from pipeline.model.task import PositionTask
@@ -22,10 +20,7 @@ from pipeline.path.curves import Line, circle, direction_vector
 from pipeline.path.reference import Reference
 from pipeline.path.timing import RaisedCosine
 from pipeline.problem.problem import Problem
-from pipeline.reproduce import __main__ as reproduce
 from pipeline.robot import urdf
-from pipeline.run import session
-from tests.benchmarks.peer import PlanarArm
 from tests.support import ROOT
 
 settings.register_profile("project", derandomize=True, deadline=None, max_examples=50)
@@ -94,6 +89,10 @@ def guess() -> Callable[[Problem], Array]:
 @pytest.fixture(scope="session")
 def peer(planar_file: Path) -> SimpleNamespace:
     """The planar arm written out in CasADi: each member maps stacked rows (K, 3) to stacked results."""
+    import casadi as ca
+
+    from tests.benchmarks.peer import PlanarArm
+
     planar = PlanarArm.from_urdf(planar_file)
     q, qd, qdd = (ca.SX.sym(name, 3) for name in ("q", "qd", "qdd"))
     energy, tip = planar.kinetic_energy(q, qd), planar.end_effector(q)
@@ -102,7 +101,7 @@ def peer(planar_file: Path) -> SimpleNamespace:
     mass = ca.jacobian(momentum, qd)
     torque = mass @ qdd + bias
 
-    def stacked(expression: ca.SX) -> Callable[..., Array]:
+    def stacked(expression: Any) -> Callable[..., Array]:
         function = ca.Function("f", [q, qd, qdd], [ca.densify(expression)])
 
         def call(*rows: Array) -> Array:
@@ -130,6 +129,11 @@ def peer(planar_file: Path) -> SimpleNamespace:
 @pytest.fixture(scope="session")
 def reproduced(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Every run that a printed number is found in, with fewer starts and without pictures: the folder above `runs`."""
+    from hydra.core.global_hydra import GlobalHydra
+
+    from pipeline.config import documents
+    from pipeline.reproduce import __main__ as reproduce
+    from pipeline.run import session
     from tests.reports import leave_out_pictures
 
     folder = tmp_path_factory.mktemp("reproduced")

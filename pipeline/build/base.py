@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from pipeline.build.regular import require_regular
 from pipeline.common.arrays import Array
 from pipeline.common.errors import ConfigError
 from pipeline.config.robot import FreeBaseConfig
@@ -18,7 +19,7 @@ from pipeline.problem.integrals import INTEGRALS
 from pipeline.problem.limits import Limits
 from pipeline.problem.problem import Problem
 from pipeline.robot.spacecraft import Spacecraft
-from pipeline.robot.urdf import root_mass
+from pipeline.robot.urdf import check_root, root_mass
 
 
 def place(problem: Problem, config: RunConfig) -> Problem:
@@ -62,6 +63,8 @@ def _moved(problem: Problem, base: Base) -> Problem:
     """The same task, path and limits, with the base's coordinates before the joints: no limits but on its attitude."""
     fixed = problem.task.arm
     arm = Arm(fixed.description, fixed.mounting, base)
+    if base.kind == "floating":
+        require_regular(arm)
     free = np.full(base.count, np.inf)
 
     def padded(values: Array, sign: float = 1.0) -> Array:
@@ -81,6 +84,7 @@ def _moved(problem: Problem, base: Base) -> Problem:
 
 
 def _spacecraft(base: FreeBaseConfig, arm: Arm) -> Spacecraft:
+    check_root(arm.description)
     momentum = (*base.linear_momentum, *base.angular_momentum)
     if base.mass is None:
         if root_mass(arm.description) <= 0:

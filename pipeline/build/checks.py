@@ -8,11 +8,15 @@ from pipeline.common.errors import ConfigError, PathError
 from pipeline.model.clearance import Clearance
 from pipeline.model.kinematics import project
 from pipeline.problem.problem import Boundary, Problem
+from pipeline.robot.limits import require_room
 
 
 def check_problem(problem: Problem) -> None:
     """Refuse what no motion can meet: contradicting limits, a fixed start outside them, an open path for a cycle."""
-    limits, names = problem.bounds, problem.task.arm.description.joints
+    limits, description = problem.bounds, problem.task.arm.description
+    names = description.joints
+    for key, values in (("velocity", limits.velocity), ("effort", limits.torque)):
+        require_room(description, key, values)
     for joint in np.flatnonzero(limits.lower >= limits.upper):
         raise ConfigError(
             f"limits.lower of {names[joint]} ({limits.lower[joint]:.4g}) is not below limits.upper ({limits.upper[joint]:.4g})"

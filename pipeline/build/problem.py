@@ -10,12 +10,15 @@ from pipeline.build.robot import initial, load
 from pipeline.config.run import RunConfig
 from pipeline.path.reference import Reference
 from pipeline.problem.problem import Boundary, Problem
+from pipeline.robot.limits import require_held_within
 
 
 def prepare(config: RunConfig) -> Problem:
     """The problem that a configuration states; raises InputError, one line, if it cannot be posed."""
     robot = config.robot
     arm = load(robot, config.gravity)
+    if config.limits.kind != "none":
+        require_held_within(arm.description)
     task = make_task(robot, arm)
     q_init = initial(robot, arm)
     geometry, orientation, q_init = make_path(config.path, task, q_init)

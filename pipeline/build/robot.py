@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from pipeline.build.regular import require_regular
 from pipeline.common.arrays import Array
 from pipeline.common.errors import ConfigError, RobotError
 from pipeline.config.robot import CapsuleConfig, RobotConfig, SphereConfig
@@ -25,7 +26,14 @@ GRAVITY = {"none": (0.0, 0.0, 0.0), "earth": (0.0, 0.0, -9.80665)}  # [m/s^2]
 
 def load(robot: RobotConfig, gravity: str | Sequence[float] = "none") -> Arm:
     """The arm of a configuration; raises RobotError or ConfigError, one line."""
-    description = urdf.read(find(robot.urdf), robot.end_effector, robot.base, robot.locked)
+    description = urdf.read(
+        find(robot.urdf),
+        robot.end_effector,
+        robot.base,
+        robot.locked,
+        repair_inertia=robot.repair_inertia,
+        unlimited=robot.unlimited,
+    )
     if robot.collision is not None:
         shapes = _link_shapes(robot.collision, description)
         description = replace(description, collision=shapes)
@@ -33,17 +41,18 @@ def load(robot: RobotConfig, gravity: str | Sequence[float] = "none") -> Arm:
         raise ConfigError(
             f"robot.armature has {len(robot.armature)} values, the arm has {len(description.joints)} moving joints"
         )
-    armature = robot.armature
     mounting = Mounting(
-        offset=tuple(robot.offset),
-        offset_rpy=tuple(robot.offset_rpy),
-        base_position=tuple(robot.base_position),
-        base_rpy=tuple(robot.base_rpy),
+        offset=robot.offset,
+        offset_rpy=robot.offset_rpy,
+        base_position=robot.base_position,
+        base_rpy=robot.base_rpy,
         gravity=GRAVITY[gravity] if isinstance(gravity, str) else tuple(gravity),
         payload=robot.payload,
-        armature=tuple(armature) if isinstance(armature, list) else armature,
+        armature=robot.armature,
     )
-    return Arm(description, mounting)
+    arm = Arm(description, mounting)
+    require_regular(arm)
+    return arm
 
 
 def initial(robot: RobotConfig, arm: Arm) -> Array:

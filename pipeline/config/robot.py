@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from pipeline.config.fields import Number, Numbers, OneOrList, Text, Vector, Words, schema
+from pipeline.config.fields import Number, Numbers, OneOrList, Switch, Text, Vector, Words, schema
 
 Positive = Annotated[Number, Field(gt=0)]
 Edges = Annotated[tuple[Positive, ...], Field(min_length=3, max_length=3)]
@@ -85,6 +85,13 @@ class RobotConfig:
     locked: Annotated[
         dict[str, Number] | None, Field(description="{joint: position [rad or m], ...} of joints that are held")
     ] = None
+    repair_inertia: Annotated[
+        Switch, Field(description="whether inertias that no body can have give way to the nearest possible ones")
+    ] = False
+    unlimited: Annotated[
+        tuple[Literal["velocity", "effort"], ...],
+        Field(description="of which limits of zero in the file mean that there is none"),
+    ] = ()
 
 
 @schema

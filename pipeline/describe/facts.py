@@ -41,7 +41,7 @@ def inspect(robot: RobotConfig, gravity: str | Sequence[float] = "none") -> Fact
     arm = load(robot, gravity)
     description = arm.description
     q_init = initial(robot, arm)
-    notes = []
+    notes = list(description.notes)
     unlimited = [n for n, v in zip(description.joints, description.velocity, strict=True) if not np.isfinite(v)]
     weak = [n for n, v in zip(description.joints, description.effort, strict=True) if not np.isfinite(v)]
     for names, what in ((unlimited, "velocity"), (weak, "effort")):

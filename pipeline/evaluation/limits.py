@@ -31,7 +31,7 @@ def excesses(problem: Problem, q: Array, qd: Array, tau: Array) -> dict[str, Arr
     limits = problem.bounds
     half = np.where(np.isfinite(limits.upper - limits.lower), (limits.upper - limits.lower) / 2, 1.0)
     kinds = {
-        "position": (np.maximum(q - limits.upper, limits.lower - q) / half, limits.upper),
+        "position": (np.maximum(q - limits.upper, limits.lower - q) / half, np.minimum(-limits.lower, limits.upper)),
         "velocity": (np.abs(qd) / limits.velocity - 1, limits.velocity),
         "torque": (np.abs(tau) / limits.torque - 1, limits.torque),
         "power": (np.abs(tau * qd) / limits.power - 1, limits.power),

@@ -15,13 +15,24 @@ from pipeline.robot.shapes import Shape
 
 
 @dataclass(frozen=True)
+class Held:
+    """A joint that is locked at a position [rad or m], and the limits that the file gives it."""
+
+    joint: str
+    position: float
+    lower: float
+    upper: float
+
+
+@dataclass(frozen=True)
 class Description:
     """One serial chain, ready for Drake.
 
     xml: the reduced URDF. joints: names of the n moving joints, base to tip. revolute: (n,) whether a joint turns.
     lower, upper: (n,) position limits [rad or m]. velocity: (n,) [rad/s or m/s]. effort: (n,) [N m or N].
     A limit that the file does not state is infinite. collision: primitive shapes of links. meshes: links that have
-    collision meshes instead, which are not used. pictures: file names of visual meshes.
+    collision meshes instead, which are not used. pictures: file names of visual meshes. held: the joints that are locked.
+    notes: what was read otherwise than it stands in the file, one line each.
     base_coordinates: how many of the joints, the first ones, are not the arm's but move its base (`spacecraft.py`), and
     root: the link of the xml that they start from.
     """
@@ -41,6 +52,8 @@ class Description:
     collision: tuple[Shape, ...] = ()
     meshes: tuple[str, ...] = ()
     pictures: tuple[str, ...] = ()
+    held: tuple[Held, ...] = ()
+    notes: tuple[str, ...] = ()
     base_coordinates: int = 0
     root: str = ""
 

@@ -1,20 +1,24 @@
-"""Where `package://name/...` lies: in ROS's package paths, or in an installed Python package that ships robots."""
+"""Where `package://name/...` and `model://name/...` lie: in ROS's or Gazebo's paths, or in an installed Python package."""
 
 from __future__ import annotations
 
 import importlib.util
 import os
+import re
 import site
 import sys
 import sysconfig
 from collections.abc import Iterator
 from pathlib import Path
-from pathlib import Path as File
+from urllib.parse import unquote, urlsplit
 
 from pipeline.common.errors import RobotError
 from pipeline.common.files import shipped
+from pipeline.robot.markup import parse
 
-PREFIX = "package://"
+SCHEMES = ("package://", "model://")
+ROS = ("ROS_PACKAGE_PATH",)
+GAZEBO = ("GZ_SIM_RESOURCE_PATH", "IGN_GAZEBO_RESOURCE_PATH", "GAZEBO_MODEL_PATH", "SDF_PATH")
 
 
 # Packages on the package index that ship robots, by the name that their URDFs use, and how to get them.
@@ -22,13 +26,15 @@ KNOWN = {"example-robot-data": "pip install 'selfmotion[robots]'"}
 
 
 def resolve(uri: str, beside: Path | None = None) -> Path | None:
-    """The file of a `package://`, `file://` or plain name, which may be relative to the folder `beside`; None if unknown."""
-    if uri.startswith("file://"):
-        return Path(uri.removeprefix("file://"))
-    if not uri.startswith(PREFIX):
+    """The file of a `package://`, `model://`, `file://` or plain name, which may be relative to the folder `beside`; None
+    if unknown.
+    """
+    if uri.startswith("file:"):
+        return Path(unquote(urlsplit(uri).path))
+    if not uri.startswith(SCHEMES):
         path = Path(uri).expanduser()
         return beside / path if beside is not None and not path.is_absolute() else path
-    name, _, rest = uri.removeprefix(PREFIX).partition("/")
+    name, rest = _parts(uri)
     for folder in _folders(name, beside):
         if (folder / rest).exists():
             return folder / rest
@@ -36,15 +42,44 @@ def resolve(uri: str, beside: Path | None = None) -> Path | None:
 
 
 def locate(uri: str, key: str) -> Path:
-    """The file of a `package://` name; raises RobotError that says how to make the package known."""
+    """The file of a `package://` or `model://` name; raises RobotError that says how to make the package known."""
     found = resolve(uri)
     if found is None:
-        name, _, rest = uri.removeprefix(PREFIX).partition("/")
+        name, rest = _parts(uri)
         if any(folder.exists() for folder in _folders(name, None)):
             raise RobotError(f"{key} = {uri}: package {name} is there, but holds no {rest}")
-        hint = KNOWN.get(name, "set ROS_PACKAGE_PATH or AMENT_PREFIX_PATH, or install it")
+        hint = "set GZ_SIM_RESOURCE_PATH or GAZEBO_MODEL_PATH"
+        if uri.startswith("package://"):
+            hint = KNOWN.get(name, "set ROS_PACKAGE_PATH or AMENT_PREFIX_PATH, or install it")
         raise RobotError(f"{key} = {uri}: no package {name} was found; {hint}")
     return found
+
+
+def model_file(uri: str, beside: Path | None = None) -> Path | None:
+    """The SDF file that a model's name leads to: itself, or the one that the model.config of its folder names."""
+    found = resolve(uri, beside)
+    if found is None or found.is_file():
+        return found
+    config = found / "model.config"
+    if config.is_file():
+        named = [(e.get("version", ""), (e.text or "").strip()) for e in parse(config.read_bytes(), config).iter("sdf")]
+        newest = max(named, key=lambda one: [int(part) for part in re.findall("[0-9]+", one[0])], default=("", ""))[1]
+        if newest and (found / newest).is_file():
+            return found / newest
+    return found / "model.sdf" if (found / "model.sdf").is_file() else None
+
+
+def named_folder(uri: str, beside: Path | None = None) -> dict[str, str]:
+    """The package that a name begins with, and its folder; empty if it names none, or one that is not known."""
+    name = _parts(uri)[0] if uri.startswith(SCHEMES) else ""
+    folder = next((folder for folder in _folders(name, beside) if folder.is_dir()), None) if name else None
+    return {} if folder is None else {name: str(folder)}
+
+
+def _parts(uri: str) -> tuple[str, str]:
+    """The package and the rest of a `package://` or `model://` name."""
+    name, _, rest = uri.partition("://")[2].partition("/")
+    return name, rest
 
 
 def _folders(name: str, beside: Path | None) -> Iterator[Path]:
@@ -52,12 +87,10 @@ def _folders(name: str, beside: Path | None) -> Iterator[Path]:
     for parent in () if beside is None else (beside, *beside.parents):  # a package's own files know it by its folder
         if parent.name == name:
             yield parent
-    for root in os.environ.get("ROS_PACKAGE_PATH", "").split(os.pathsep):
-        if root:
-            yield from (Path(root), Path(root) / name) if Path(root).name == name else (Path(root) / name,)
-    for root in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep):
-        if root:
-            yield Path(root) / "share" / name
+    for root in _listed(*ROS, *GAZEBO):
+        yield from (Path(root), Path(root) / name) if Path(root).name == name else (Path(root) / name,)
+    for root in _listed("AMENT_PREFIX_PATH"):
+        yield Path(root) / "share" / name
     roots = dict.fromkeys(
         [sysconfig.get_path("purelib"), *site.getsitepackages(), site.getusersitepackages(), *sys.path]
     )
@@ -74,11 +107,18 @@ def _folders(name: str, beside: Path | None) -> Iterator[Path]:
             yield Path(location)
 
 
-def find(name: str) -> File:
-    """A robot description by package:// name, absolute path, or path relative to the working directory or the project."""
-    if name.startswith(PREFIX):
-        return locate(name, "robot.urdf")
-    given = File(name).expanduser()
+def _listed(*variables: str) -> list[str]:
+    """The folders in variables of the environment."""
+    return [root for variable in variables for root in os.environ.get(variable, "").split(os.pathsep) if root]
+
+
+def find(name: str) -> Path:
+    """A robot description by package://, model:// or file:// name, absolute path, or path relative to the working directory
+    or the project.
+    """
+    if name.startswith(SCHEMES):
+        return model_file(name) or locate(name, "robot.urdf")
+    given = Path(unquote(urlsplit(name).path)) if name.startswith("file:") else Path(name).expanduser()
     if not given.is_absolute() and not given.is_file() and (ours := shipped(name)).is_file():
         return ours
     return given.absolute()  # kept results are found again from any working directory

@@ -9,6 +9,16 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from pipeline.common.arrays import Array
+from pipeline.common.errors import RobotError
+from pipeline.robot.numbers import Vector, numbers, shown
+
+# How URDF calls them, what they become, and the attributes that give their sizes.
+SIZES = {
+    "sphere": ("sphere", ("radius",)),
+    "box": ("box", ("size",)),
+    "cylinder": ("capsule", ("radius", "length")),
+    "capsule": ("capsule", ("radius", "length")),
+}
 
 
 @dataclass(frozen=True)
@@ -38,38 +48,35 @@ def capsule(name: str, start: Array, end: Array, radius: float, frame: str | Non
     return Shape(name, "capsule", (radius, length), middle, tuple(map(float, turn)), frame)
 
 
-def link_shapes(robot: ET.Element) -> tuple[list[Shape], list[str]]:
+def link_shapes(robot: ET.Element, where: str = "robot") -> tuple[list[Shape], list[str]]:
     """The primitive collision shapes of a URDF's links, and the names of links that have meshes instead.
 
     A cylinder becomes the capsule that holds it: its distance is smooth, and never overestimates the clearance.
+    Raises RobotError, which begins with `where`, for what is no number.
     """
     shapes, meshes = [], []
     for link in robot.findall("link"):
         name = link.get("name", "")
-        for number, collision in enumerate(link.findall("collision")):
+        for count, collision in enumerate(link.findall("collision")):
             origin, solid = collision.find("origin"), collision.find("geometry")
             if solid is None:
                 continue
+            what = f"{where}: link '{name}' has in its collision the"
             values = {} if origin is None else origin.attrib
-            position = _numbers(values.get("xyz", "0 0 0"))
-            rotation = Rotation.from_euler("xyz", _numbers(values.get("rpy", "0 0 0"))).as_rotvec()
+            position = numbers(values.get("xyz", "0 0 0"), 3, f"{what} origin xyz")
+            rotation = Rotation.from_euler("xyz", numbers(values.get("rpy", "0 0 0"), 3, f"{what} origin rpy"))
             for child in solid:
-                size: tuple[float, ...]
-                if child.tag == "sphere":
-                    kind, size = "sphere", _numbers(child.get("radius", "0"))
-                elif child.tag == "box":
-                    kind, size = "box", _numbers(child.get("size", "0 0 0"))
-                elif child.tag in ("cylinder", "capsule"):
-                    kind = "capsule"
-                    size = _numbers(f"{child.get('radius', '0')} {child.get('length', '0')}")
-                else:
+                if child.tag not in SIZES:
                     meshes.append(name)
                     continue
+                kind, keys = SIZES[child.tag]
+                size: Vector = ()
+                for key in keys:
+                    text, place = child.get(key, ""), f"{what} {child.tag} {key}"
+                    size += numbers(text, 3 if kind == "box" else 1, place)
+                    if min(size) < 0:
+                        raise RobotError(f"{place} '{shown(text)}', expected no negative number")
                 if min(size) > 0:
-                    turn = tuple(map(float, rotation))
-                    shapes.append(Shape(f"{name}_{number}", kind, size, position, turn, name))
+                    turn = tuple(map(float, rotation.as_rotvec()))
+                    shapes.append(Shape(f"{name}_{count}", kind, size, position, turn, name))
     return shapes, sorted(set(meshes))
-
-
-def _numbers(text: str) -> tuple[float, ...]:
-    return tuple(float(word) for word in text.split())

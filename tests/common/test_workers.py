@@ -3,13 +3,7 @@
 from __future__ import annotations
 
 import json
-import os
 import pickle
-import signal
-import subprocess
-import sys
-import time
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -17,50 +11,24 @@ import pandas as pd
 import pytest
 
 from pipeline.build.problem import prepare
+from pipeline.common import workers as workers_module
 from pipeline.common.workers import Workers
 from pipeline.config import run as config
 from pipeline.methods import method
 from pipeline.methods.global_planner.planner import global_planner
 from pipeline.run.run import UNFINISHED
-from tests.support import ROOT, RUN_FILES
-
-
-@dataclass(frozen=True)
-class Context:
-    folder: Path
-    factor: float = 1.0
-
-
-def multiply(context: Context, item: float) -> float:
-    (context.folder / f"{time.monotonic_ns()}.call").write_text(str(item), encoding="utf-8")
-    return context.factor * item
-
-
-def backwards(context: Context, item: float) -> float:
-    """The first items take longest: with two workers the later ones are ready before them."""
-    time.sleep(0.05 * (4 - item))
-    return multiply(context, item)
-
-
-def nothing(context: Context, item: float) -> None:
-    multiply(context, item)
-
-
-def fail_at_three(context: Context, item: float) -> float:
-    if item == 3 and not (context.folder / "mended").exists():
-        raise RuntimeError("three")
-    return multiply(context, item)
-
-
-def calls(folder: Path) -> list[float]:
-    return sorted(float(file.read_text(encoding="utf-8")) for file in folder.glob("*.call"))
+from tests.killed import run_and_kill
+from tests.run.test_main import call
+from tests.support import RUN_FILES
+from tests.tasks import Context, calls, fail_at_three, in_pairs, kept, multiply, nothing
 
 
 @pytest.mark.parametrize("count", [1, 2, 8])
 def test_results_and_progress_come_in_the_order_of_the_items(tmp_path: Path, count: int) -> None:
     said: list[tuple[int, float]] = []
     items = [0.0, 1.0, 2.0, 3.0]
-    results = Workers(count).map(backwards, Context(tmp_path, 2.0), items, lambda *step: said.append(step))
+    function = multiply if count == 1 else in_pairs
+    results = Workers(count).map(function, Context(tmp_path, 2.0), items, lambda *step: said.append(step))
     assert results == [0.0, 2.0, 4.0, 6.0]
     assert said == [(1, 0.0), (2, 2.0), (3, 4.0), (4, 6.0)]
     assert calls(tmp_path) == items
@@ -88,14 +56,16 @@ def test_without_a_store_nothing_is_kept(tmp_path: Path) -> None:
     assert calls(tmp_path) == [1.0, 1.0]
 
 
-@pytest.mark.parametrize("change", ["function", "context", "item", "store"])
-def test_other_work_is_done_again(tmp_path: Path, change: str) -> None:
+@pytest.mark.parametrize("change", ["function", "context", "item", "store", "versions"])
+def test_other_work_is_done_again(tmp_path: Path, change: str, monkeypatch: pytest.MonkeyPatch) -> None:
     context = Context(tmp_path)
     Workers(1, tmp_path / "store").map(multiply, context, [1.0])
     function = fail_at_three if change == "function" else multiply
     context = Context(tmp_path, 2.0) if change == "context" else context
     item = 1.0 + 1e-15 if change == "item" else 1.0
     store = tmp_path / ("other" if change == "store" else "store")
+    if change == "versions":
+        monkeypatch.setattr(workers_module, "stamp", lambda: "selfmotion 99")
     assert Workers(1, store).map(function, context, [item]) == [context.factor * item]
     assert len(calls(tmp_path)) == 2
 
@@ -197,35 +167,22 @@ def test_the_planner_starts_from_what_is_kept(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_killed_run_goes_on(tmp_path: Path) -> None:
+def test_a_killed_run_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
     words = [
         *("+experiment=sim1", "timing.steps=26", "parallel.workers=1"),
         *(f"method.global.{key}" for key in ("configurations=8", "candidates=100", "optimised=10")),
     ]
 
-    def begin(folder: Path) -> subprocess.Popen[bytes]:
-        environment = {**os.environ, "PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
-        command = [sys.executable, "-m", "pipeline", *words, f"hydra.run.dir={folder}"]
-        quiet = subprocess.DEVNULL
-        return subprocess.Popen(command, cwd=tmp_path, env=environment, stdout=quiet, stderr=quiet)
-
     killed = tmp_path / "killed"
-    process = begin(killed)
-    try:
-        until = time.monotonic() + 60
-        while len(list((killed / UNFINISHED).glob("*.pickle"))) < 3:
-            assert process.poll() is None, "the run ended before it could be killed"
-            assert time.monotonic() < until
-            time.sleep(0.005)
-    finally:
-        process.send_signal(signal.SIGKILL)
-        process.wait()
-    kept = [pickle.loads(file.read_bytes()) for file in (killed / UNFINISHED).glob("*.pickle")]
+    run_and_kill(killed, 3, *words, f"hydra.run.dir={killed}", cwd=tmp_path)
+    finished = [pickle.loads(file.read_bytes()) for file in kept(killed / UNFINISHED)]
     assert not list(killed.glob("*.csv"))
     assert not list(killed.glob("*.parquet"))
     assert not list(killed.glob("*.rrd"))
 
-    assert begin(killed).wait(timeout=120) == 0
+    assert call(monkeypatch, capfd, *words, f"hydra.run.dir={killed}").code == 0
     assert not (killed / UNFINISHED).exists()
     assert {file.name for file in killed.iterdir()} == RUN_FILES
     # The same as without the interruption.
@@ -239,7 +196,7 @@ def test_a_killed_run_goes_on(tmp_path: Path) -> None:
     # The finished starts were not solved again: their wall times, never twice the same, are in the final record.
     log = json.loads((killed / "run.json").read_text(encoding="utf-8"))["solutions"][0]["statistics"]["starts"]
     times = {solve["wall_time_s"] for start in log for solve in start["solves"]}
-    assert 3 <= len(kept) < len(log)
-    for optimum in kept:
+    assert len(finished) == 3 < len(log)
+    for optimum in finished:
         payload = optimum if hasattr(optimum, "solves") else optimum[-1]
         assert {solve["wall_time_s"] for solve in payload.solves} <= times

@@ -26,7 +26,8 @@ from pipeline.program.transcription import transcribe
 from tests.program.test_program import program_jacobian, program_value
 from tests.support import composed
 
-SHORT = ("timing.duration=4", "timing.steps=40", "method.global.optimised=4")
+FEW = tuple(f"method.global.{key}" for key in ("configurations=8", "candidates=100", "optimised=2"))
+SHORT = ("timing.duration=4", "timing.steps=30", *FEW)
 ON_BASE = ("robot=planar3r_base", "base=free", *SHORT)
 CIRCLE = ("path=circle", "path.radius=0.05", "boundary=cyclic")
 
@@ -84,13 +85,13 @@ def test_momentum_and_path_of_the_other_methods(method: str) -> None:
 @pytest.mark.slow
 def test_the_path_error_is_of_second_order_in_the_step() -> None:
     errors = []
-    for steps in (50, 100, 200):
-        problem, solution = stated(*ON_BASE[:-2], f"timing.steps={steps}", "method.global.optimised=1")
+    for steps in (25, 50, 100):
+        problem, solution = stated(*ON_BASE, f"timing.steps={steps}", "method.global.optimised=1")
         joints = solution.trajectory.q[:, problem.task.arm.joints]
         found = integrate(problem, solution.trajectory.time, joints)
         errors.append(found.path_error)
     order = np.log2(np.array(errors[:-1]) / errors[1:])
-    assert errors[-1] < 1e-6
+    assert errors[-1] < 5e-6
     assert np.all((order > 1.8) & (order < 2.4)), order
 
 
@@ -124,7 +125,7 @@ def test_momentum_that_is_given_is_kept() -> None:
 def test_limits_are_kept_and_felt() -> None:
     free = solved(*ON_BASE, "boundary=free")[1]
     limits = ("limits=joint", "limits.velocity=1.0", "limits.torque=0.03", "limits.power=0.02", "limits.attitude=0.05")
-    e = solved(*ON_BASE, "boundary=free", "method.global.optimised=8", *limits)[1]
+    e = solved(*ON_BASE, "boundary=free", "method.global.optimised=4", *limits)[1]
     assert e.status is Status.SOLVED, e.message
     assert set(e.limit_excess) == {"position", "velocity", "torque", "power", "attitude"}
     assert max(e.limit_excess.values()) <= 1e-6
@@ -159,7 +160,7 @@ def test_an_attitude_that_is_exceeded_is_named() -> None:
 
 def test_a_fine_grid_does_not_make_a_cycle_harder() -> None:
     """Closed joints leave the base turns about the centre of mass alone: rows that these cannot change must not be there."""
-    _, solution = stated(*ON_BASE, *CIRCLE, "timing.steps=100", "method.global.optimised=2")
+    _, solution = stated(*ON_BASE, *CIRCLE, "timing.steps=100", "method.global.optimised=1")
     assert solution.status is Status.SOLVED, solution.message
     assert solution.statistics["solves"][-1]["iterations"] < 30
 
@@ -204,9 +205,8 @@ def test_heavy_bases_are_fixed_ones_in_the_limit() -> None:
     """Energies differ from the fixed base's in proportion to 1 / mass, the base turns in proportion to it."""
     words = (
         *SHORT,
-        "method.global.optimised=2",
         "path.length=0.2",
-        "timing.steps=25",
+        "timing.steps=16",
         "method.pmke.prediction_step=0.8",
         "method.pmke.update_interval=0.4",
     )
@@ -243,7 +243,7 @@ def test_reactions_are_the_rate_of_momentum(rng: np.random.Generator) -> None:
     assert e.base.reaction is not None
     plant, h = BasePlant(problem.task.arm), 1e-5
     rotation, position = plant.start
-    for i in (5, 17, 33):
+    for i in (4, 13, 25):
         sides = []
         for sign in (1, -1):
             qd = e.qd[i] + sign * h * e.qdd[i]
@@ -273,7 +273,7 @@ def test_least_reaction_on_a_held_base() -> None:
 @pytest.mark.slow
 def test_least_turning_brings_the_base_to_rest() -> None:
     """A planar arm with r = 1 can follow the path and turn its base by nothing."""
-    e = solved(*ON_BASE, "objective=base_rotation", "method.global.optimised=6")[1]
+    e = solved(*ON_BASE, "objective=base_rotation", "method.global.optimised=4")[1]
     energy = solved(*ON_BASE)[1]
     assert e.status is Status.SOLVED, e.message
     assert e.integral("base_rotation") < 1e-6 * energy.integral("base_rotation")

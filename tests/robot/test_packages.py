@@ -92,3 +92,18 @@ def test_a_package_without_the_file_is_one_line(tmp_path: Path, monkeypatch: pyt
     monkeypatch.setenv("ROS_PACKAGE_PATH", str(tmp_path))
     with pytest.raises(RobotError, match=r"^robot\.urdf = .*: package some_arm is there, but holds no urdf/leg\.urdf$"):
         packages.locate(ARM.replace("arm.urdf", "leg.urdf"), "robot.urdf")
+
+
+def test_names_of_other_schemes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = made(tmp_path / "my models" / "some_arm")
+    assert packages.find(file.as_uri()) == file  # with %20
+    monkeypatch.setenv("GZ_SIM_RESOURCE_PATH", str(tmp_path / "my models"))
+    assert packages.find("model://some_arm/urdf/arm.urdf") == file
+    model = file.parents[1]
+    (model / "old.sdf").write_text("<sdf/>", encoding="utf-8")
+    (model / "new.sdf").write_text("<sdf/>", encoding="utf-8")
+    stated = '<sdf version="1.10">new.sdf</sdf><sdf version="1.9">old.sdf</sdf>'
+    (model / "model.config").write_text(f"<model>{stated}</model>", encoding="utf-8")
+    assert packages.find("model://some_arm") == model / "new.sdf"
+    with pytest.raises(RobotError, match=r"no package other was found; set GZ_SIM_RESOURCE_PATH or GAZEBO_MODEL_PATH$"):
+        packages.find("model://other/model.sdf")

@@ -167,3 +167,66 @@ def test_a_model_that_stands_nowhere_is_mounted(write: Callable[[str, str], Path
     loose = standing[:at] + standing[standing.index("</joint>", at) + len("</joint>") :]
     arms = [Arm(urdf.read(write("robot.sdf", content), "hand")) for content in (standing, loose)]
     np.testing.assert_allclose(arms[0].position(Q), arms[1].position(Q), atol=1e-14)
+
+
+@pytest.mark.parametrize("name", ["robot.xml", "robot.world", "robot.urdf", "robot"])
+def test_it_is_told_by_what_it_holds(write: Callable[[str, str], Path], name: str) -> None:
+    got = Arm(urdf.read(write(name, as_sdf(ROBOT, FRAMES)), "hand"))
+    np.testing.assert_allclose(
+        got.position(Q), Arm(urdf.read(write("arm.sdf", as_sdf(ROBOT, FRAMES)), "hand")).position(Q), atol=1e-15
+    )
+
+
+DEFAULTS = {  # what would be 1 kg or 1 kg m^2 that nobody wrote down: old text, new text, what the message must name
+    "no mass": ("<mass>1.0</mass>", "", ["upper", "<mass>"]),
+    "a mass of zero": ("<mass>1.0</mass>", "<mass>0</mass>", ["upper", "no mass"]),
+    "no inertia": ("<inertia>", "<none>", ["upper", "<inertia>"]),
+    "no izz": ("<izz>0.015</izz>", "", ["upper", "<izz>"]),
+    "computed by itself": ("<inertial>", '<inertial auto="true">', ["upper", "auto"]),
+    "mass with an underscore": ("<mass>1.0</mass>", "<mass>1_0</mass>", ["upper", "mass", "1_0"]),
+    "pose of the inertial": ("<inertial><pose>", "<inertial><pose>x ", ["upper", "pose"]),
+}
+
+
+@pytest.mark.parametrize("fault", DEFAULTS)
+def test_no_default_of_sdf_leaks_in(write: Callable[[str, str], Path], fault: str) -> None:
+    old, new, named = DEFAULTS[fault]
+    sound = as_sdf(ROBOT, FRAMES)
+    assert old in sound
+    broken = sound.replace(old, new, 1)
+    if fault == "no inertia":
+        broken = broken.replace("</inertia>", "</none>", 1)
+    with pytest.raises(RobotError) as caught:
+        urdf.read(write("robot.sdf", broken), "hand")
+    for word in named:
+        assert word in str(caught.value)
+
+
+def test_poses_and_limits_that_are_no_numbers(write: Callable[[str, str], Path]) -> None:
+    sound = as_sdf(ROBOT, FRAMES)
+    for old, new, named in (
+        ('<link name="upper"><pose>', '<link name="upper"><pose>nan ', r"link 'upper' has the pose"),
+        ("<velocity>3</velocity>", "<velocity>fast</velocity>", r"joint 'shoulder' has the velocity limit 'fast'"),
+        ("<lower>-1.5</lower>", "<lower>nan</lower>", r"joint 'shoulder' has the lower limit 'nan'"),
+        ("<xyz>0.6 0.8 0</xyz>", "<xyz>0.6 0,8 0</xyz>", r"joint 'elbow' has in its axis the xyz '0,8'"),
+    ):
+        assert old in sound
+        with pytest.raises(RobotError, match=named):
+            urdf.read(write("robot.sdf", sound.replace(old, new, 1)), "hand")
+
+
+def test_an_included_model_is_the_same_arm(write: Callable[[str, str], Path], monkeypatch: pytest.MonkeyPatch) -> None:
+    arm = write("inner.sdf", as_sdf(ROBOT, FRAMES))
+    folder = arm.parent / "some_arm"
+    folder.mkdir()
+    arm.rename(folder / "model.sdf")
+    monkeypatch.setenv("GZ_SIM_RESOURCE_PATH", str(arm.parent))
+    plain = Arm(urdf.read(folder / "model.sdf", "hand"))
+    for uri in ("model://some_arm", "some_arm/model.sdf"):
+        outer = f'<sdf version="1.9"><world name="w"><include><uri>{uri}</uri><pose>1 2 3 0 0 0</pose></include></world></sdf>'
+        got = Arm(urdf.read(write("outer.world", outer), "hand"))
+        np.testing.assert_allclose(got.position(Q), plain.position(Q), atol=1e-14)
+        np.testing.assert_allclose(got.mass_matrix(Q), plain.mass_matrix(Q), atol=1e-13)
+        np.testing.assert_array_equal(got.description.effort, plain.description.effort)
+    with pytest.raises(RobotError, match="the included model model://none was not found"):
+        urdf.read(write("outer.world", outer.replace("some_arm/model.sdf", "model://none")), "hand")

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
-import time
+import shutil
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -19,20 +16,42 @@ from pipeline.common.workers import Workers
 from pipeline.config.run import RunConfig
 from pipeline.problem.problem import Problem
 from pipeline.run import run as run_module
+from tests.killed import run_and_kill
 from tests.reports import leave_out_pictures
-from tests.run.test_main import ROOT, Answer, call, command
+from tests.run.test_main import Answer, call, command
+from tests.tasks import kept
 
 Sweep = Callable[..., Answer]
-LSV = ("-m", "name=traj1", "methods=[lsv]", "timing.steps=10", "path=line", "hydra.sweep.dir=all")
+LSV = (
+    *("-m", "name=traj1", "methods=[lsv]", "timing.steps=10", "method.lsv.dt=0.05", "path=line"),
+    "hydra.sweep.dir=all",
+)
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a sweep over two lengths. Tests go on in a copy of it."""
+    folder = tmp_path_factory.mktemp("finished")
+    with pytest.MonkeyPatch.context() as patch:
+        leave_out_pictures(patch)
+        patch.chdir(folder)
+        assert call(patch, None, *LSV, "path.length=0.1,0.15").code == 0
+    return folder / "all"
 
 
 @pytest.fixture
 def sweep(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Sweep:
-    """A sweep into the folder `all`, within this process and without pictures, which take most of the time."""
+    """A sweep into the folder `all`, within this process."""
     leave_out_pictures(monkeypatch)
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "points.csv").write_text("x,y\n0.0,0.0\n0.0,0.05\n0.0,0.1\n", encoding="utf-8")
     return partial(call, monkeypatch, capfd, *LSV)
+
+
+@pytest.fixture
+def again(sweep: Sweep, tmp_path: Path, finished: Path) -> Sweep:
+    """The same where `path.length=0.1,0.15` is finished."""
+    shutil.copytree(finished, tmp_path / "all")
+    return sweep
 
 
 def skipped(answer: Answer) -> list[str]:
@@ -43,54 +62,58 @@ def table(folder: Path) -> pd.DataFrame:
     return pd.read_csv(folder / "all" / "sweep.csv")
 
 
-def test_what_is_finished_is_skipped_and_stays_in_the_table(sweep: Sweep, tmp_path: Path) -> None:
-    first = sweep("path.length=0.1,0.15,0.2")
-    assert (first.code, skipped(first)) == (0, [])
+def test_what_is_finished_is_skipped_and_stays_in_the_table(again: Sweep, tmp_path: Path) -> None:
     made = (tmp_path / "all" / "sweep.csv").read_bytes()
-    again = sweep("path.length=0.1,0.15,0.2", "parallel.workers=2")  # how it is computed changes no result
-    assert (again.code, skipped(again)) == (0, ["0_traj1", "1_traj1", "2_traj1"])
+    answer = again("path.length=0.1,0.15", "parallel.workers=2")  # how it is computed changes no result
+    assert (answer.code, skipped(answer)) == (0, ["0_traj1", "1_traj1"])
     assert (tmp_path / "all" / "sweep.csv").read_bytes() == made
-    assert list(table(tmp_path)["path.length"]) == [0.1, 0.15, 0.2]
-    (tmp_path / "all" / "1_traj1" / "run.json").unlink()  # killed before the end
-    assert skipped(sweep("path.length=0.1,0.15,0.2")) == ["0_traj1", "2_traj1"]
-    assert skipped(sweep("path.length=0.1,0.15,0.2", "sweep.resume=false")) == []
+    assert list(table(tmp_path)["path.length"]) == [0.1, 0.15]
+    (tmp_path / "all" / "0_traj1" / "run.json").unlink()  # killed before the end
+    assert skipped(again("path.length=0.1,0.15")) == ["1_traj1"]
+    assert skipped(again("path.length=0.1", "sweep.resume=false")) == []
 
 
-@pytest.mark.parametrize("change", ["value", "file", "version", "record"])
+@pytest.mark.parametrize("change", ["value", "version", "record", "objective"])
 def test_what_would_be_another_run_is_run_again(
-    change: str, sweep: Sweep, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    change: str, again: Sweep, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    words = ["path=waypoints", "path.file=points.csv", "path.relative=true", "method.lsv.gain=0,1"]
-    assert sweep(*words).code == 0
+    words = ["path.length=0.1"]
     if change == "value":
-        words[-1] = "method.lsv.gain=0,2"
-    elif change == "file":
-        (tmp_path / "points.csv").write_text("x,y\n0.0,0.0\n0.0,0.04\n0.0,0.1\n", encoding="utf-8")
+        words = ["path.length=0.1,0.2"]
     elif change == "version":
         monkeypatch.setattr(versions, "_of", lambda package: "99")
+    elif change == "record":
+        (tmp_path / "all" / "0_traj1" / "run.json").write_text('{"config": ', encoding="utf-8")
     else:
-        (tmp_path / "all" / "1_traj1" / "run.json").write_text('{"config": ', encoding="utf-8")
-    assert skipped(sweep(*words)) == (["0_traj1"] if change in ("value", "record") else [])
+        words += ["objective=torque"]
+    assert skipped(again(*words)) == (["0_traj1"] if change == "value" else [])
+    assert len(skipped(again(*words))) == len(table(tmp_path))
 
 
-def test_a_run_that_fails_takes_the_finished_one_out_of_its_folder(sweep: Sweep, tmp_path: Path) -> None:
-    assert sweep("path.length=0.1,0.15").code == 0
-    assert sweep("path.length=0.1,3.0").code == 2
+def test_another_content_of_a_file_is_another_run(sweep: Sweep, tmp_path: Path) -> None:
+    words = ["path=waypoints", "path.file=points.csv", "path.relative=true"]
+    for middle in (0.05, 0.04):
+        (tmp_path / "points.csv").write_text(f"x,y\n0.0,0.0\n0.0,{middle}\n0.0,0.1\n", encoding="utf-8")
+        assert skipped(sweep(*words)) == []
+    assert skipped(sweep(*words)) == ["0_traj1"]
+
+
+def test_a_run_that_fails_takes_the_finished_one_out_of_its_folder(again: Sweep, tmp_path: Path) -> None:
+    assert again("path.length=0.1,3.0").code == 2
     assert list(table(tmp_path)["status"]) == ["solved", "bad input"]
-    assert skipped(sweep("path.length=0.1,0.15")) == ["0_traj1"]
+    assert skipped(again("path.length=0.1,0.15")) == ["0_traj1"]
     assert list(table(tmp_path)["status"]) == ["solved", "solved"]
 
 
-def test_a_run_that_is_finished_but_not_confirmed_is_not_made_better_by_skipping(sweep: Sweep, tmp_path: Path) -> None:
-    words = ["path.length=0.1", "method.lsv.max_drift=1e-12,0.01"]
+def test_a_run_that_is_finished_but_not_confirmed_is_not_made_better_by_skipping(sweep: Sweep) -> None:
+    words = ["path.length=0.1", "method.lsv.max_drift=1e-12"]
     assert sweep(*words).code == 1
-    again = sweep(*words)
-    assert (again.code, len(skipped(again))) == (1, 2)
+    answer = sweep(*words)
+    assert (answer.code, skipped(answer)) == (1, ["0_traj1"])
 
 
-def test_runs_of_an_earlier_sweep_are_not_in_the_table(sweep: Sweep, tmp_path: Path) -> None:
-    assert sweep("path.length=0.1,3.0").code == 2
-    assert sweep("path.length=0.1").code == 0
+def test_runs_of_an_earlier_sweep_are_not_in_the_table(again: Sweep, tmp_path: Path) -> None:
+    assert again("path.length=0.1").code == 0
     assert list(table(tmp_path)["run"]) == ["0_traj1"]
 
 
@@ -105,20 +128,20 @@ def test_a_run_that_crashes_is_a_row_and_the_others_go_on(
         return solve(problem, config, *more)  # type: ignore[arg-type]
 
     monkeypatch.setattr(run_module, "solve", fragile)
-    answer = sweep("path.length=0.1", "seed=1,2,3")
+    answer = sweep("path.length=0.1", "seed=2,1")
     assert answer.code == 1
-    assert answer.error == "error: 1_traj1: RuntimeError: a | bug in two lines (see error.txt)\n"
+    assert answer.error == "error: 0_traj1: RuntimeError: a | bug in two lines (see error.txt)\n"
     rows = table(tmp_path)
-    assert list(rows["status"]) == ["solved", "error", "solved"]
-    assert list(rows["seed"]) == [1, 2, 3]
-    assert rows["message"][1].startswith("RuntimeError: a | bug in two lines")
-    assert "in fragile" in (tmp_path / "all" / "1_traj1" / "error.txt").read_text(encoding="utf-8")
+    assert list(rows["status"]) == ["error", "solved"]
+    assert list(rows["seed"]) == [2, 1]
+    assert rows["message"][0].startswith("RuntimeError: a | bug in two lines")
+    assert "in fragile" in (tmp_path / "all" / "0_traj1" / "error.txt").read_text(encoding="utf-8")
     lines = (tmp_path / "all" / "sweep.md").read_text(encoding="utf-8").splitlines()
-    assert [line.split(" | ")[1] for line in lines if line.startswith("|") and "_traj1" in line] == ["1", "2", "3"]
+    assert [line.split(" | ")[1] for line in lines if line.startswith("|") and "_traj1" in line] == ["2", "1"]
     monkeypatch.setattr(run_module, "solve", solve)
-    mended = sweep("path.length=0.1", "seed=1,2,3")
-    assert (mended.code, skipped(mended)) == (0, ["0_traj1", "2_traj1"])
-    assert not (tmp_path / "all" / "1_traj1" / "error.txt").exists()
+    mended = sweep("path.length=0.1", "seed=2,1")
+    assert (mended.code, skipped(mended)) == (0, ["1_traj1"])
+    assert not (tmp_path / "all" / "0_traj1" / "error.txt").exists()
 
 
 def test_a_crash_of_a_single_run_is_not_hidden(
@@ -163,22 +186,13 @@ def test_launchers(launcher: tuple[str, str], sweep: Sweep, tmp_path: Path) -> N
 def test_a_killed_sweep_goes_on(sweep: Sweep, tmp_path: Path) -> None:
     few = [f"method.global.{key}" for key in ("configurations=8", "candidates=60", "optimised=6")]
     more = ["+experiment=sim1", "methods=[global]", "timing.steps=26", *few, "path.length=0.4", "seed=1,2"]
-    environment = {**os.environ, "PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
-    line = [sys.executable, "-m", "pipeline", *LSV, *more, "name=sim1", "parallel.workers=1"]
-    process = subprocess.Popen(line, cwd=tmp_path, env=environment, stdout=subprocess.DEVNULL)
-    try:  # the first run is finished, the second at work
-        until = time.monotonic() + 60
-        while len(list((tmp_path / "all" / "1_sim1" / run_module.UNFINISHED).glob("*.pickle"))) < 2:
-            assert process.poll() is None, "the sweep ended before it could be killed"
-            assert time.monotonic() < until
-            time.sleep(0.005)
-    finally:
-        process.kill()
-        process.wait()
+    # The first run is finished, the second at work.
+    run_and_kill(Path("1_sim1"), 2, *LSV, *more, "name=sim1", "parallel.workers=1", cwd=tmp_path)
+    assert len(kept(tmp_path / "all" / "1_sim1" / run_module.UNFINISHED)) == 2
     record = (tmp_path / "all" / "0_sim1" / "run.json").read_bytes()
     assert not (tmp_path / "all" / "1_sim1" / "run.json").exists()
-    again = sweep(*more, "name=sim1", "parallel.workers=2")
-    assert (again.code, skipped(again)) == (0, ["0_sim1"])
+    answer = sweep(*more, "name=sim1", "parallel.workers=2")
+    assert (answer.code, skipped(answer)) == (0, ["0_sim1"])
     assert (tmp_path / "all" / "0_sim1" / "run.json").read_bytes() == record
     assert sweep(*more, "name=sim1", "hydra.sweep.dir=whole").code == 0
     tables = [pd.read_csv(tmp_path / name / "sweep.csv").drop(columns="wall_time_s") for name in ("all", "whole")]
@@ -187,9 +201,3 @@ def test_a_killed_sweep_goes_on(sweep: Sweep, tmp_path: Path) -> None:
     for run in ("0_sim1", "1_sim1"):
         motions = [pd.read_parquet(tmp_path / name / run / "trajectories.parquet") for name in ("all", "whole")]
         pd.testing.assert_frame_equal(*motions, check_exact=True)
-
-
-def test_another_objective_in_the_same_folder_is_another_run(sweep: Sweep) -> None:
-    assert sweep("path.length=0.1,0.15", "objective=kinetic_energy").code == 0
-    assert skipped(sweep("path.length=0.1,0.15", "objective=torque")) == []
-    assert skipped(sweep("path.length=0.1,0.15", "objective=torque")) == ["0_traj1", "1_traj1"]

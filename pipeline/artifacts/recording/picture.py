@@ -10,6 +10,7 @@ import xml.etree.ElementTree as ET
 from pathlib import Path
 
 from pipeline.robot.description import Description
+from pipeline.robot.markup import parse
 from pipeline.robot.packages import resolve
 
 LARGE = 4_000_000  # bytes of meshes
@@ -22,7 +23,13 @@ def picture(description: Description) -> tuple[str, list[str]]:
     """A URDF with visuals only, and one note for all that is missing; its links and joints have the file's names."""
     if description.file.suffix == ".sdf":
         return "", ["an SDF file's pictures are not drawn"]
-    root = ET.fromstring(description.file.read_bytes())
+    root = parse(description.file.read_bytes(), description.file)
+    if root.tag != "robot":
+        return "", [f"the pictures of a file with <{root.tag}> are not drawn"]
+    _drop_foreign(root)
+    parents = {parent.get("link") for parent in root.iterfind("joint/parent")}
+    if "world" in parents - {link.get("name") for link in root.findall("link")}:
+        root.insert(0, ET.Element("link", name="world"))
     missing: list[str] = []
     large = _resolve(root, "visual", description.file.parent, missing) > LARGE
     if large:
@@ -43,6 +50,16 @@ def picture(description: Description) -> tuple[str, list[str]]:
     named = missing[0] + ", ..." * (len(missing) > 1)
     note = f"{count} of {description.file.name} not found, drawn without ({named})"
     return ET.tostring(root, encoding="unicode"), [note]
+
+
+def _drop_foreign(root: ET.Element) -> None:
+    """Take out simulators' blocks, which may use prefixes that are bound nowhere."""
+    for child in list(root):
+        if child.tag not in ("link", "joint", "material"):
+            root.remove(child)
+    for parent in list(root.iter()):
+        for child in [child for child in parent if ":" in child.tag]:
+            parent.remove(child)
 
 
 def _simplify(root: ET.Element) -> int:
