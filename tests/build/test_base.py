@@ -7,7 +7,7 @@ import pytest
 
 from pipeline.build.problem import prepare
 from pipeline.common.errors import ConfigError
-from pipeline.run.solve import state
+from pipeline.run.state import state
 from tests.support import composed
 
 FREE = ("base=free", "base.mass=10", "base.inertia=0.2")
