@@ -116,7 +116,10 @@ class GlobalOptions:
     limit_weight: Annotated[
         Number, Field(ge=0, description="k_L of eq. (14): distance from the joint limits in the ranking")
     ] = 0.01
-    coarse_steps: Annotated[Whole, Field(ge=2, description="intervals of the coarsest grid, at most")] = 25
+    coarse_steps: Annotated[
+        Annotated[Whole, Field(ge=2)] | None,
+        Field(description="intervals of the coarsest grid, at most; null: 25, and 12 where ipopt works alone"),
+    ] = None
     tolerance: Tolerance = 1e-8
     max_iterations: Iterations = 300
     same_path: Annotated[

@@ -80,7 +80,7 @@ class Plan:
     def __init__(self, name: str) -> None:
         config = composed(f"+experiment={name}")
         self.problem, self.options = prepare(config), config.method.of("global")
-        self.grids = planner.refinement(self.problem.times, self.options.coarse_steps)
+        self.grids = planner.refinement(self.problem.times, self.options.coarse_steps or planner.STEPS)
         begin = time.process_time()
         self.motions, _ = planner._starts(self.problem, self.grids[0], self.options, np.random.default_rng(config.seed))
         self.drawn = time.process_time() - begin

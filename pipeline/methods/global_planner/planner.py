@@ -45,9 +45,10 @@ ELASTIC_STARTS = 3  # from how many motions IPOPT seeks a motion, and the least 
 FEWER = 12  # starts on a finer grid after none succeeded on the coarse one
 
 
-FEW_STEPS = (
-    12  # intervals of the coarsest grid of a base that moves: its starts are a population, whose size grows with it
-)
+STEPS = 25  # intervals of the coarsest grid: 12 miss optima
+
+
+STEPS_ALONE = 12  # where each start costs a solve of its own
 
 
 HOPELESS = 0.1  # relative violation on a coarse grid from which on finer ones are not tried
@@ -55,14 +56,13 @@ HOPELESS = 0.1  # relative violation on a coarse grid from which on finer ones a
 
 def solve(problem: Problem, options: GlobalOptions, context: Context) -> list[Solution]:
     """All distinct optima found, best first."""
-    moves = problem.task.arm.base.count > 0
-    grids = refinement(problem.times, min(options.coarse_steps, FEW_STEPS) if moves else options.coarse_steps)
+    why = Batch.without(problem, options)
+    grids = refinement(problem.times, options.coarse_steps or (STEPS if why is None else STEPS_ALONE))
     motions, log = _starts(problem, grids[0], options, np.random.default_rng(context.seed))
     if not len(motions):
         message = "none of the motions that were drawn follows the path to its end; it may leave the reach of the arm"
         return [_nothing(problem, Status.INFEASIBLE, message, log)]
 
-    why = Batch.without(problem, options)
     batch = Batch(problem, options) if why is None else None
     log["solver"] = "newton, confirmed by ipopt" if why is None else f"ipopt ({why})"
     while True:
