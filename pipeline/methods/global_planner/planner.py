@@ -145,6 +145,8 @@ def _starts(
         paths = Roadmap(options.nodes, options.layers, options.optimised).starts(problem, coarse, rng)
         log["roadmap_paths"] = len(paths)
         parts.append(paths)
+        if not len(paths):  # nothing within the limits or clear of obstacles: what comes nearest is the solver's to say
+            wanted = ("population",)
     if "population" in wanted:
         configurations = starting_points(problem, options.configurations, rng, options.draw)
         count = options.candidates or (len(coarse) * problem.task.arm.n) ** 2
