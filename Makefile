@@ -37,7 +37,7 @@ cover: $(VENV)/.installed-dev ## which lines the tests do not reach
 schema: $(VENV)/.installed ## write conf/schema.json, by which editors check the files of conf/
 	$(BIN)/python -m pipeline.config
 
-bench: $(VENV)/.installed-dev ## time the solver side by side with CasADi (never part of the tests)
+bench: $(VENV)/.installed-dev ## time the solver side by side with CasADi (the tests run it too, small, and judge no times)
 	$(BIN)/python -m tests.benchmarks
 
 package: $(VENV)/.installed-dev ## sdist and wheel, tried in an environment of their own from another folder

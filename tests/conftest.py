@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -22,6 +23,7 @@ from pipeline.path.timing import RaisedCosine
 from pipeline.problem.problem import Problem
 from pipeline.robot import urdf
 from tests.support import ROOT
+from tests.tasks import wait_until
 
 settings.register_profile("project", derandomize=True, deadline=None, max_examples=50)
 settings.load_profile("project")
@@ -128,7 +130,29 @@ def peer(planar_file: Path) -> SimpleNamespace:
 
 @pytest.fixture(scope="session")
 def reproduced(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Every run that a printed number is found in, with fewer starts and without pictures: the folder above `runs`."""
+    """Every run that a printed number is found in, with fewer starts and without pictures: the folder above `runs`.
+
+    Test processes that run side by side share it: the first makes it, the others wait.
+    """
+    own = tmp_path_factory.getbasetemp()
+    folder = (own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / "reproduced"
+    made, failed = folder / "made", folder / "failed"
+    try:
+        folder.mkdir()
+    except FileExistsError:
+        wait_until(lambda: made.exists() or failed.exists())
+    else:
+        try:
+            reproduce_in(folder)
+            made.touch()
+        finally:
+            if not made.exists():
+                failed.touch()
+    assert made.exists(), "the reproduction failed in another process"
+    return folder
+
+
+def reproduce_in(folder: Path) -> None:
     from hydra.core.global_hydra import GlobalHydra
 
     from pipeline.config import documents
@@ -136,19 +160,20 @@ def reproduced(tmp_path_factory: pytest.TempPathFactory) -> Path:
     from pipeline.run import session
     from tests.reports import leave_out_pictures
 
-    folder = tmp_path_factory.mktemp("reproduced")
-    few = ("method.global.candidates=300", "method.global.optimised=16", "candidate_study.repeats=4")
+    few = (
+        *(f"method.global.{key}" for key in ("configurations=12", "candidates=150", "optimised=12")),
+        *("candidate_study.most=2000", "candidate_study.repeats=2", "identification.documents=[global]"),
+    )
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("HYDRA_FULL_ERROR", "0")  # the command line sets it; this puts it back
         patch.setattr(session, "exit_code", 0)
         patch.setattr(sys, "argv", ["reproduce"])
         leave_out_pictures(patch)
         for names, words in (
-            (("pmke", "global"), (*few, "identification.documents=[global]")),
+            (("pmke", "global"), few),
             (("pontryagin",), ("methods=[pontryagin_as_printed]",)),
         ):
             GlobalHydra.instance().clear()
             wanted = dict.fromkeys(e for name in names for e in documents.read(name).experiments if e != "pareto")
-            assert reproduce.sweep(list(wanted), folder / "runs", words) == 0
+            assert reproduce.sweep(list(wanted), folder / "runs", (*words, "parallel.workers=1")) == 0
     GlobalHydra.instance().clear()
-    return folder

@@ -17,6 +17,7 @@ from pipeline.build.robot import load
 from pipeline.common.arrays import Array
 from pipeline.config import run as config
 from pipeline.config.compose import checked
+from pipeline.config.methods import GlobalOptions
 from pipeline.model.arm import Arm
 from pipeline.problem.problem import Problem
 from pipeline.robot.shapes import Shape, capsule
@@ -48,6 +49,11 @@ def backward_differences(problem: Problem, times: Array, motions: Array) -> Arra
     velocity = np.diff(motions, axis=1) / dt[:, None]
     energy = problem.task.arm.kinetic_energy(motions[:, 1:].reshape(-1, 3), velocity.reshape(-1, 3))
     return energy.reshape(len(motions), -1) @ dt
+
+
+# Starts enough for the optima of the tests' arms and paths, at a fraction of what the defaults cost.
+FEW = GlobalOptions(configurations=12, candidates=150, optimised=6)
+FEW_STARTS = tuple(f"method.global.{key}={getattr(FEW, key)}" for key in ("configurations", "candidates", "optimised"))
 
 
 def composed(*overrides: str) -> config.RunConfig:

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-HUNG = 300.0  # [s]: whatever a test waits for comes much sooner, on a busy machine too
+HUNG = 1800.0  # [s]: whatever a test waits for comes much sooner, on a busy machine too
 
 
 def wait_until(ready: Callable[[], bool]) -> None:

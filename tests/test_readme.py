@@ -11,8 +11,8 @@ from hydra import compose, initialize_config_dir
 
 from pipeline.config.compose import checked
 from pipeline.describe.facts import inspect
-from pipeline.run import run
 from pipeline.run.main import CONF
+from pipeline.run.state import state
 
 ROOT = Path(__file__).resolve().parent.parent
 TEXTS = {name: (ROOT / name).read_text(encoding="utf-8") for name in ("README.md", "docs/errata.md", "docs/tour.md")}
@@ -38,7 +38,7 @@ def test_commands_state_a_problem(command: str) -> None:
     for number in range(max(len(_values(word)) for word in words) if words else 1):
         overrides = [_values(word)[min(number, len(_values(word)) - 1)] for word in words]
         with initialize_config_dir(CONF, version_base="1.3"):
-            run.prepare(checked(compose("config", overrides=overrides)))
+            state(checked(compose("config", overrides=overrides)))
 
 
 @pytest.mark.parametrize("command", INSPECTED)

@@ -15,7 +15,6 @@ from pipeline.evaluation.evaluation import evaluate
 from pipeline.methods.calculus_of_variations.stationary import calculus_of_variations
 from pipeline.methods.global_planner.planner import global_planner
 from pipeline.methods.lsv import inertia_weighted, lsv
-from pipeline.methods.method import Context
 from pipeline.methods.pmke.predictive import pmke
 from pipeline.model.arm import Arm
 from pipeline.model.obstacles import Obstacles
@@ -35,7 +34,7 @@ from pipeline.search.population import population
 from pipeline.search.selection import diverse
 from tests.benchmarks.peer import PlanarArm, kinetic_energy_program, solve
 from tests.program.test_program import program_jacobian, program_value
-from tests.support import BALL, ROBOTS, composed, robot, with_shapes, within_limits
+from tests.support import BALL, FEW, ROBOTS, composed, robot, with_shapes, within_limits
 
 
 def everything(name: str, rng: np.random.Generator) -> Problem:
@@ -134,18 +133,19 @@ def test_a_placed_base_moves_the_whole_arm(rng: np.random.Generator) -> None:
 # --- optima ---------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_planar_4r_equals_the_peer() -> None:
     """r = 2, fixed start: CasADi's exact Hessians from the same candidates find no better, and the same."""
     problem = prepare(
-        composed("robot=planar4r", "path.length=0.5", "path.direction=150", "timing.duration=2", "timing.steps=40")
+        composed("robot=planar4r", "path.length=0.5", "path.direction=150", "timing.duration=2", "timing.steps=30")
     )
-    best = global_planner(problem)[0]
+    best = global_planner(problem, FEW)[0]
     ours = evaluate(problem, best)
     rng = np.random.default_rng(3)
-    guesses = population(problem, problem.times, problem.q_init[None], 400, rng)
-    guesses = guesses[diverse(guesses, objective_values(problem, problem.times, guesses), 24, 0.1, np.ones(4, bool))]
+    guesses = population(problem, problem.times, problem.q_init[None], 200, rng)
+    guesses = guesses[diverse(guesses, objective_values(problem, problem.times, guesses), 12, 0.1, np.ones(4, bool))]
     peer = PlanarArm.from_urdf(shipped("robots/planar4r.urdf"))
-    program = kinetic_energy_program(peer, 40, 0.05)
+    program = kinetic_energy_program(peer, 30, 2 / 30)
     path = problem.reference.position(problem.times[1:])
     costs = [solve(program, problem.q_init, path, guess[1:])[1] for guess in guesses]
     assert ours.energy_integral[-1] == pytest.approx(min(costs), rel=1e-6)
@@ -155,9 +155,8 @@ def test_planar_4r_equals_the_peer() -> None:
 @pytest.mark.slow
 def test_the_panda_on_a_line() -> None:
     """The documents' next step, a real arm: 20 % below the pseudoinverse within every limit of its description."""
-    config = composed("+experiment=panda")
-    problem = prepare(config)
-    best = evaluate(problem, global_planner(problem, config.method.global_, Context(config.seed))[0])
+    problem = prepare(composed("+experiment=panda"))
+    best = evaluate(problem, global_planner(problem, FEW)[0])
     plain = evaluate(problem, lsv(problem)[0])
     weighted = evaluate(problem, inertia_weighted(problem)[0])
     assert best.status is plain.status is weighted.status is Status.SOLVED
@@ -169,9 +168,8 @@ def test_the_panda_on_a_line() -> None:
 
 @pytest.mark.slow
 def test_the_panda_holds_its_hand_and_keeps_off_a_ball() -> None:
-    config = composed("+experiment=panda_pose_obstacle")
-    problem = prepare(config)
-    best = evaluate(problem, global_planner(problem, config.method.global_, Context(config.seed))[0])
+    problem = prepare(composed("+experiment=panda_pose_obstacle"))
+    best = evaluate(problem, global_planner(problem, FEW)[0])
     plain = evaluate(problem, lsv(problem)[0])
     assert plain.clearance.min() < 0
     assert best.status is Status.SOLVED
@@ -186,7 +184,7 @@ def test_the_panda_holds_its_hand_and_keeps_off_a_ball() -> None:
 def test_a_pose_task_by_the_calculus_of_variations_and_by_the_planner() -> None:
     """r = 1 on seven joints, from a fixed start and without limits: two methods that share nothing but the arm."""
     problem = prepare(composed("+experiment=panda_pose", "limits=none", "timing.steps=50", "path.turn=[0,0.4,0.2]"))
-    best = evaluate(problem, global_planner(problem)[0])
+    best = evaluate(problem, global_planner(problem, FEW)[0])
     found = calculus_of_variations(problem, CalculusOfVariationsOptions(spacing=0.1, max_speed=0.5))
     stationary = min(float(motion.statistics["integral"]) for motion in found)
     assert best.energy_integral_spline == pytest.approx(stationary, rel=0.02)
@@ -194,6 +192,7 @@ def test_a_pose_task_by_the_calculus_of_variations_and_by_the_planner() -> None:
     assert nearest < 0.05
 
 
+@pytest.mark.slow
 def test_pmke_and_pointing() -> None:
     problem = prepare(
         composed(
@@ -209,7 +208,7 @@ def test_pmke_and_pointing() -> None:
         lsv(problem)[0],
         inertia_weighted(problem)[0],
         pmke(problem)[0],
-        global_planner(problem, composed("method.global.optimised=4").method.global_)[0],
+        global_planner(problem, FEW)[0],
     ):
         judged = evaluate(problem, solution)
         assert judged.status is Status.SOLVED, judged.message

@@ -47,7 +47,7 @@ def summary(report: Report) -> pd.DataFrame:
             row |= result.columns(e)
         row["wall_time_s"] = report.seconds[e.method]
         if e.solution.optimum == 1:
-            row |= _differences(row, printed.values.get(e.method, {}))
+            row |= _differences(row, printed.numbers.get(e.method, {}))
         if printed.note and not rows:
             row["published_note"] = printed.note
         rows.append(row)

@@ -9,6 +9,7 @@ import numpy as np
 from pipeline.build.regular import require_regular
 from pipeline.common.arrays import Array
 from pipeline.common.errors import ConfigError
+from pipeline.config.messages import shown
 from pipeline.config.robot import FreeBaseConfig
 from pipeline.config.run import RunConfig
 from pipeline.model.arm import Arm
@@ -95,7 +96,7 @@ def _spacecraft(base: FreeBaseConfig, arm: Arm) -> Spacecraft:
     given = np.atleast_1d(np.asarray(base.inertia, dtype=float))
     if len(given) not in (1, 3, 6):
         raise ConfigError(
-            f"base.inertia = {base.inertia}: must be one moment, three or six (ixx, iyy, izz, ixy, ixz, iyz)"
+            f"base.inertia = {shown(base.inertia)}: must be one moment, three or six (ixx, iyy, izz, ixy, ixz, iyz)"
         )
     xx, yy, zz = np.broadcast_to(given[:3], 3) if len(given) > 1 else np.repeat(given, 3)
     xy, xz, yz = given[3:] if len(given) == 6 else np.zeros(3)
@@ -103,7 +104,7 @@ def _spacecraft(base: FreeBaseConfig, arm: Arm) -> Spacecraft:
     a, b, c = np.linalg.eigvalsh(inertia)
     if a < 0 or a + b < c * (1 - 1e-9):
         raise ConfigError(
-            f"base.inertia = {base.inertia}: no body has the principal moments {a:.3g}, {b:.3g}, {c:.3g} kg m^2; each is at "
+            f"base.inertia = {shown(base.inertia)}: no body has the principal moments {a:.3g}, {b:.3g}, {c:.3g} kg m^2; each is at "
             "most the sum of the others"
         )
     rows = tuple(tuple(map(float, row)) for row in inertia)

@@ -17,6 +17,7 @@ from pipeline.model.obstacles import Obstacles
 from pipeline.problem.limits import Limits
 from pipeline.problem.objective import Objective
 from pipeline.problem.secondary import Secondary
+from pipeline.robot.limits import UNLIMITED
 
 
 def make_limits(limits: LimitsConfig, arm: Arm) -> Limits:
@@ -30,7 +31,8 @@ def make_limits(limits: LimitsConfig, arm: Arm) -> Limits:
             return own
         if isinstance(given, tuple) and len(given) != arm.n:
             raise ConfigError(f"limits.{key} has {len(given)} values, the arm has {arm.n} moving joints")
-        return np.broadcast_to(np.asarray(given, dtype=float), arm.n).copy()
+        values = np.broadcast_to(np.asarray(given, dtype=float), arm.n)
+        return np.where(np.abs(values) < UNLIMITED, values, np.copysign(np.inf, values))
 
     return Limits(
         lower=bound("lower", description.lower if joint else -free),

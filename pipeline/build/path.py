@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from pipeline.common.arrays import Array
 from pipeline.common.errors import ConfigError, RobotError
+from pipeline.config.messages import shown
 from pipeline.config.path import CircleConfig, PathConfig, TimingConfig, WaypointsConfig
 from pipeline.config.robot import RobotConfig
 from pipeline.model.arm import Arm
@@ -78,7 +79,7 @@ def _geometry(path: Any, task: Task, here: Array) -> Geometry:
         points = read_waypoints(path.file, task.axes)
         return Spline(points + here - points[0] if path.relative else points)
     if path.start is not None and len(path.start) != count:
-        raise ConfigError(f"path.start = {path.start}: must be {count} numbers m, one for each of robot.task")
+        raise ConfigError(f"path.start = {shown(path.start)}: must be {count} numbers m, one for each of robot.task")
     start = here if path.start is None else np.array(path.start)
     if isinstance(path, CircleConfig):
         return circle(

@@ -18,7 +18,7 @@ def require_regular(arm: Arm) -> None:
     q = np.random.default_rng(0).uniform(-1.0, 1.0, (SAMPLES, arm.n))
     mass = arm.mass_matrix(q)
     diagonal = np.einsum("kii->ki", mass)
-    involved = np.flatnonzero((diagonal < ROUNDING * diagonal.max()).all(axis=0))
+    involved = np.flatnonzero((diagonal <= ROUNDING * diagonal.max()).all(axis=0))
     if not involved.size:
         scale = 1.0 / np.sqrt(np.maximum(diagonal, ROUNDING * diagonal.max()))
         values, vectors = np.linalg.eigh(mass * scale[:, :, None] * scale[:, None, :])

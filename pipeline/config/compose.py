@@ -17,8 +17,6 @@ from pipeline.config.run import RunConfig, check
 
 def experiment(name: str, *overrides: str) -> RunConfig:
     """The checked configuration of `+experiment=name`; raises ConfigError, one line."""
-    from pipeline.config.compose import checked
-
     words = [f"+experiment={name}", *overrides]
     if GlobalHydra.instance().is_initialized():
         return checked(compose("config", overrides=words))

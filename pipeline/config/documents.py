@@ -11,202 +11,23 @@ from dataclasses import dataclass, field
 from decimal import Decimal
 from functools import cache, cached_property
 from pathlib import Path
-from typing import Annotated, ClassVar, Literal, NamedTuple
+from typing import Annotated, Literal
 
 import yaml
 from pydantic import Field
 
 from pipeline.common.errors import ConfigError
 from pipeline.common.files import shipped
-from pipeline.config.fields import Number, Text, Whole, build, schema
+from pipeline.config.fields import Number, Text, build, schema
+from pipeline.config.found import Ratio, Simple, Summary
 
 FOLDER = shipped("conf") / "reproduction"
 
 
 DOCUMENTS = ("pmke", "global", "pontryagin")
 
-Experiment = Annotated[Text, Field(description="the experiment whose run holds it")]
-MethodOf = Annotated[Text, Field(description="the method, as in summary.csv")]
-Joint = Annotated[Whole, Field(ge=1, description="the joint, from the base, from 1")]
 Names = tuple[Text, ...]
 Pair = Annotated[tuple[Number, ...], Field(min_length=2, max_length=2)]
-Optimum = Annotated[Whole, Field(ge=1, description="the optimum, as in summary.csv")]
-
-
-class Cell(NamedTuple):
-    """Where summary.csv holds a number."""
-
-    method: str
-    optimum: int
-    column: str
-
-
-@schema
-class Found:
-    """Where a run's results hold a number."""
-
-    experiment: Experiment = ""
-
-    @property
-    def experiments(self) -> tuple[str, ...]:
-        """The experiments that the number takes."""
-        return (self.experiment,)
-
-    @property
-    def cell(self) -> Cell | None:
-        """The cell of summary.csv that is the number, if one is."""
-        return None
-
-
-@schema
-class Summary(Found):
-    """A cell of summary.csv."""
-
-    method: MethodOf = ""
-    optimum: Optimum = 1
-    column: Annotated[Text, Field(description="the column of summary.csv")] = ""
-    kind: Literal["summary"] = "summary"
-
-    @property
-    def cell(self) -> Cell | None:
-        return Cell(self.method, self.optimum, self.column)
-
-
-@schema
-class Peak(Found):
-    """The largest velocity of one joint of a motion, up to a moment: its size, or the largest positive one."""
-
-    method: MethodOf = ""
-    joint: Joint = 1
-    until: Annotated[Number | None, Field(description="[s] the moment; null: the end")] = None
-    side: Annotated[Literal["both", "positive"], Field(description="both: by size")] = "both"
-    kind: Literal["peak"] = "peak"
-
-    @property
-    def cell(self) -> Cell | None:
-        whole = self.until is None and self.side == "both"
-        return Cell(self.method, 1, f"peak_velocity_{self.joint}") if whole else None
-
-
-@schema
-class LimitTime(Found):
-    """From or until when the planner's first optimum is at a limit [s]; a knot's velocity is that of the interval before."""
-
-    joint: Joint = 1
-    limit: Annotated[Literal["velocity", "torque", "power"], Field(description="which limit")] = "velocity"
-    end: Annotated[Literal["from", "until"], Field(description="which end of the time")] = "from"
-    kind: Literal["limit_time"] = "limit_time"
-
-
-@schema
-class JointsAtLimit(Found):
-    """How many joints of the planner's first optimum are at their velocity limits at the same time, at most."""
-
-    kind: Literal["joints_at_limit"] = "joints_at_limit"
-
-
-@schema
-class EndEffector(Found):
-    """A coordinate of the end effector at the first or the last knot of the planner's first optimum [m]."""
-
-    axis: Annotated[Literal["x", "y", "z"], Field(description="which coordinate")] = "x"
-    end: Annotated[Literal["first", "last"], Field(description="which knot")] = "first"
-    kind: Literal["end_effector"] = "end_effector"
-
-
-@schema
-class Validation(Found):
-    """A cell of validation.csv, the planner's optima beside the calculus of variations."""
-
-    optimum: Optimum = 1
-    column: Annotated[Text, Field(description="the column of validation.csv")] = ""
-    kind: Literal["validation"] = "validation"
-
-    @property
-    def cell(self) -> Cell | None:
-        first = self.column == "stationary_objective" and self.optimum == 1
-        return Cell("calculus_of_variations", 1, "kinetic_energy_integral") if first else None
-
-
-@schema
-class Minima(Found):
-    """The number of the planner's optima that continuous time has too."""
-
-    kind: Literal["minima"] = "minima"
-
-
-@schema
-class PowerLaw(Found):
-    """The fit of the candidate study: log(distance) = intercept + exponent log(candidates)."""
-
-    parameter: Annotated[Literal["exponent", "intercept"], Field(description="which parameter")] = "exponent"
-    kind: Literal["power_law"] = "power_law"
-
-
-@schema
-class PredictionTime(Found):
-    """The mean time of PMKE's predictions [s]: of the optimisation, of everything else, or of the whole."""
-
-    of: Annotated[Literal["whole", "optimisation", "rest"], Field(description="of what")] = "whole"
-    kind: Literal["prediction_time"] = "prediction_time"
-
-
-@schema
-class SpectralRatio(Found):
-    """The largest ratio over time of the spectral radius of M of one motion to that of another."""
-
-    method: MethodOf = ""
-    over: Annotated[Text, Field(description="the method of the other motion")] = ""
-    kind: Literal["spectral_ratio"] = "spectral_ratio"
-
-
-@schema
-class RangeShare(Found):
-    """How far the joints of a motion are from the middle of their ranges, at most, relative to half of them."""
-
-    method: MethodOf = ""
-    kind: Literal["range_share"] = "range_share"
-
-
-@schema
-class Mass(Found):
-    """The identified mass of a link [kg]."""
-
-    link: Annotated[Whole, Field(ge=1, description="the link, from the base, from 1")] = 1
-    kind: Literal["mass"] = "mass"
-
-
-Simple = Annotated[
-    Summary
-    | Peak
-    | LimitTime
-    | JointsAtLimit
-    | EndEffector
-    | Validation
-    | Minima
-    | PowerLaw
-    | PredictionTime
-    | SpectralRatio
-    | RangeShare
-    | Mass,
-    Field(discriminator="kind"),
-]
-
-
-@schema
-class Ratio:
-    """`of` over `to`: the ratio, how much larger in percent, or the size of that."""
-
-    of: Simple = Summary()
-    to: Simple = Summary()
-    unit: Annotated[Literal["1", "percent", "percent_of_size"], Field(description="how it is told")] = "1"
-    kind: Literal["ratio"] = "ratio"
-    cell: ClassVar[None] = None
-
-    @property
-    def experiments(self) -> tuple[str, ...]:
-        """The experiments that the number takes, each once."""
-        return tuple(dict.fromkeys((self.of.experiment, self.to.experiment)))
 
 
 @schema
@@ -216,22 +37,7 @@ class Row:
     quantity: Annotated[Text, Field(description="what it is")] = ""
     printed: Annotated[Text, Field(description="as printed")] = ""
     unit: Annotated[Text, Field(description="of the number")] = ""
-    found: Annotated[
-        Summary
-        | Peak
-        | LimitTime
-        | JointsAtLimit
-        | EndEffector
-        | Validation
-        | Minima
-        | PowerLaw
-        | PredictionTime
-        | SpectralRatio
-        | RangeShare
-        | Mass
-        | Ratio,
-        Field(discriminator="kind"),
-    ] = Summary()
+    found: Annotated[Simple | Ratio, Field(discriminator="kind")] = Summary()
     reading: Annotated[Text, Field(description="another way to read it, if it is a misprint")] = ""
     tolerance: Annotated[
         Annotated[Number, Field(gt=0)] | None, Field(description="in place of the rounding, with its reason in `why`")
@@ -355,7 +161,7 @@ def half_width(printed: str) -> float:
 class Printed:
     """What a document prints of an experiment: {method: {column of summary.csv: number}}, its name and a note."""
 
-    values: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    numbers: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     document: str = ""
     note: str = ""
 

@@ -28,13 +28,13 @@ def in_one_line(error: ValidationError, schema: Node, where: str = "") -> str:
         return f"{where}: {len(keys(schema))} values at most, in the order {', '.join(keys(schema))}"
     key, node = _place(schema, steps, where)
     if found["type"] == "value_error":
-        return f"{key} = {_shown(value)}: {found['ctx']['error']}"
+        return f"{key} = {shown(value)}: {found['ctx']['error']}"
     choice = kinds(schema, node)
     if choice and isinstance(value, Mapping):
         key, value = _joined(key, "kind"), value.get("kind")
-        return f"{key} = {_shown(value)}: {_hint(value, choice)}allowed: {', '.join(choice)}"
+        return f"{key} = {shown(value)}: {_hint(value, choice)}allowed: {', '.join(choice)}"
     about = "" if _speaks_for_itself(schema, node) else f" ({meaning(node)[1]})"
-    return f"{key} = {_shown(value)}: {_hint(value, node.get('enum', ()))}{_allowed(schema, node)}{about}"
+    return f"{key} = {shown(value)}: {_hint(value, node.get('enum', ()))}{_allowed(schema, node)}{about}"
 
 
 def unknown_key(key: str, allowed: Iterable[str]) -> str:
@@ -62,7 +62,8 @@ def _hint(word: Any, allowed: Iterable[str]) -> str:
     return f"did you mean {close[0]}? " if close else ""
 
 
-def _shown(value: Any) -> str:
+def shown(value: Any) -> str:
+    """A value as a user writes it, shortened."""
     if value is None or isinstance(value, bool):
         return {None: "null", True: "true", False: "false"}[value]
     text = repr(value) if isinstance(value, str) else str(list(value) if isinstance(value, tuple) else value)

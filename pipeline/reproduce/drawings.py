@@ -14,7 +14,7 @@ from pipeline.artifacts.figures import motions
 from pipeline.artifacts.figures.panels import EVENT, INK
 from pipeline.artifacts.figures.stroboscopic import stroboscopic
 from pipeline.common.arrays import Array
-from pipeline.config import documents
+from pipeline.config.found import PowerLaw
 from pipeline.evaluation.evaluation import Evaluation
 from pipeline.reproduce.recompute import recompute
 from pipeline.reproduce.results import Results
@@ -122,7 +122,7 @@ def candidate_study(runs: Sequence[Results], labels: Sequence[str], title: str) 
     (run,) = runs
     curve, problem = run.table("candidate_study"), run.problem
     intercept, exponent = (
-        recompute(documents.PowerLaw(run.name, parameter), {run.name: run}) for parameter in ("intercept", "exponent")
+        recompute(PowerLaw(run.name, parameter), {run.name: run}) for parameter in ("intercept", "exponent")
     )
     parameters = len(problem.times) * problem.task.arm.n
     found = Candidates(curve["candidates"].to_numpy(), curve["distance"].to_numpy(), parameters, intercept, exponent)

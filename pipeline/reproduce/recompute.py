@@ -1,4 +1,4 @@
-"""What the runs give for a printed number: one function per kind of number in `documents`."""
+"""What the runs give for a printed number: one function per kind of number in `config/found.py`."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.config import documents
+from pipeline.config import found as kinds
 from pipeline.reproduce.results import ResultError, Results
 
 AT_LIMIT = 1e-5  # relative: a value this near to its limit is at it
@@ -31,26 +31,26 @@ def _value(found: Any, runs: Runs) -> float:
 
 
 @_value.register
-def _(found: documents.Summary, runs: Runs) -> float:
+def _(found: kinds.Summary, runs: Runs) -> float:
     return runs[found.experiment].cell(found.method, found.optimum, found.column)
 
 
 @_value.register
-def _(found: documents.Peak, runs: Runs) -> float:
+def _(found: kinds.Peak, runs: Runs) -> float:
     motion = runs[found.experiment].motion(found.method)
     speed = motion[f"qd_{found.joint}"][motion["time"] <= (np.inf if found.until is None else found.until)]
     return float((speed if found.side == "positive" else speed.abs()).max())
 
 
 @_value.register
-def _(found: documents.Ratio, runs: Runs) -> float:
+def _(found: kinds.Ratio, runs: Runs) -> float:
     ratio = _value(found.of, runs) / _value(found.to, runs)
     percent = 100 * (ratio - 1)
     return {"1": ratio, "percent": percent, "percent_of_size": abs(percent)}[found.unit]
 
 
 @_value.register
-def _(found: documents.LimitTime, runs: Runs) -> float:
+def _(found: kinds.LimitTime, runs: Runs) -> float:
     run = runs[found.experiment]
     motion, j, bounds = run.motion("global"), found.joint, run.problem.bounds
     values = {
@@ -66,7 +66,7 @@ def _(found: documents.LimitTime, runs: Runs) -> float:
 
 
 @_value.register
-def _(found: documents.JointsAtLimit, runs: Runs) -> float:
+def _(found: kinds.JointsAtLimit, runs: Runs) -> float:
     run = runs[found.experiment]
     n = run.problem.task.arm.n
     speed = run.motion("global")[[f"qd_{j + 1}" for j in range(n)]].abs().to_numpy()
@@ -74,12 +74,12 @@ def _(found: documents.JointsAtLimit, runs: Runs) -> float:
 
 
 @_value.register
-def _(found: documents.EndEffector, runs: Runs) -> float:
+def _(found: kinds.EndEffector, runs: Runs) -> float:
     return float(runs[found.experiment].motion("global")[found.axis].iloc[0 if found.end == "first" else -1])
 
 
 @_value.register
-def _(found: documents.Validation, runs: Runs) -> float:
+def _(found: kinds.Validation, runs: Runs) -> float:
     table = runs[found.experiment].table("validation")
     rows = table[table["planner_optimum"] == found.optimum]
     if rows.empty or found.column not in table:
@@ -88,13 +88,13 @@ def _(found: documents.Validation, runs: Runs) -> float:
 
 
 @_value.register
-def _(found: documents.Minima, runs: Runs) -> float:
+def _(found: kinds.Minima, runs: Runs) -> float:
     table = runs[found.experiment].table("validation")
     return float((table["planner_optimum"].notna() & (table["kind"] == "minimum")).sum())
 
 
 @_value.register
-def _(found: documents.PowerLaw, runs: Runs) -> float:
+def _(found: kinds.PowerLaw, runs: Runs) -> float:
     run = runs[found.experiment]
     curve = run.table("candidate_study")
     tail = curve[curve["candidates"] >= len(run.problem.times) * run.problem.task.arm.n]
@@ -103,7 +103,7 @@ def _(found: documents.PowerLaw, runs: Runs) -> float:
 
 
 @_value.register
-def _(found: documents.PredictionTime, runs: Runs) -> float:
+def _(found: kinds.PredictionTime, runs: Runs) -> float:
     solutions = runs[found.experiment].record["solutions"]
     log = next((s["statistics"]["predictions"] for s in solutions if s["method"] == "pmke"), None)
     if not log:
@@ -113,14 +113,14 @@ def _(found: documents.PredictionTime, runs: Runs) -> float:
 
 
 @_value.register
-def _(found: documents.SpectralRatio, runs: Runs) -> float:
+def _(found: kinds.SpectralRatio, runs: Runs) -> float:
     run = runs[found.experiment]
     own, other = run.evaluation(found.method), run.evaluation(found.over)
     return float((np.interp(other.time, own.time, own.spectral_radius) / other.spectral_radius)[1:].max())
 
 
 @_value.register
-def _(found: documents.RangeShare, runs: Runs) -> float:
+def _(found: kinds.RangeShare, runs: Runs) -> float:
     run = runs[found.experiment]
     criteria = run.problem.objective.secondary
     if criteria is None:
@@ -131,6 +131,6 @@ def _(found: documents.RangeShare, runs: Runs) -> float:
 
 
 @_value.register
-def _(found: documents.Mass, runs: Runs) -> float:
+def _(found: kinds.Mass, runs: Runs) -> float:
     table = runs[found.experiment].table("masses")
     return float(table.loc[table["link"] == found.link, "identified"].iloc[0])

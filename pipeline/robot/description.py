@@ -31,8 +31,9 @@ class Description:
     xml: the reduced URDF. joints: names of the n moving joints, base to tip. revolute: (n,) whether a joint turns.
     lower, upper: (n,) position limits [rad or m]. velocity: (n,) [rad/s or m/s]. effort: (n,) [N m or N].
     A limit that the file does not state is infinite. collision: primitive shapes of links. meshes: links that have
-    collision meshes instead, which are not used. pictures: file names of visual meshes. held: the joints that are locked.
-    notes: what was read otherwise than it stands in the file, one line each.
+    collision meshes instead, which are not used. pictures: file names of visual meshes. held: joints that are locked.
+    notes: what was read otherwise than it stands in the file, one line each. root_fault: why no body has the inertia of
+    the root link, empty if one can.
     base_coordinates: how many of the joints, the first ones, are not the arm's but move its base (`spacecraft.py`), and
     root: the link of the xml that they start from.
     """
@@ -54,6 +55,7 @@ class Description:
     pictures: tuple[str, ...] = ()
     held: tuple[Held, ...] = ()
     notes: tuple[str, ...] = ()
+    root_fault: str = ""
     base_coordinates: int = 0
     root: str = ""
 

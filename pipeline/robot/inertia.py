@@ -49,6 +49,13 @@ def check(tree: Tree, group: list[str], repair: bool) -> None:
     tree.notes.append(f"{', '.join(wrong)}: no body alone has that inertia; {group[0]} has the sum of what it carries")
 
 
+def drop(tree: Tree, group: list[str]) -> None:
+    """Take away what no body can have, where it moves nothing: Drake would put something else in its place."""
+    for link in (tree.links[name] for name in group):
+        if link.inertial is not None and (link.mass <= 0.0 or _shortfall(link.inertial) > SLACK):
+            link.inertial = Inertial(link.mass, link.inertial.com) if link.mass > 0.0 else None
+
+
 def _wrong(tree: Tree, link: str) -> str:
     """Why no body has the inertia of a link; empty if one can."""
     inertial = tree.links[link].inertial
@@ -61,8 +68,8 @@ def _wrong(tree: Tree, link: str) -> str:
     if _shortfall(inertial) <= SLACK:
         return ""
     return (
-        f"link '{link}' has an inertia that no body has (principal moments {_listed(inertial)} kg m^2; each at most the sum "
-        "of the others); mend it, or take the nearest possible with robot.repair_inertia=true"
+        f"link '{link}' has an inertia that no body has (principal moments {_listed(inertial)} kg m^2; each at most "
+        "the sum of the others); mend it, or take the nearest possible with robot.repair_inertia=true"
     )
 
 
@@ -116,7 +123,7 @@ def _lever(arm: Array) -> Array:
 
 
 def check_carried(tree: Tree, chain: list[Joint], moving: list[Joint]) -> None:
-    """Every moving joint carries a mass of its own, or is one of several that stand for one joint with more freedoms."""
+    """Every moving joint carries a mass of its own, or is one of several that stand for one with more freedoms."""
     names = {joint.name for joint in moving}
     massless, virtual = [], []
     for joint in moving:
@@ -131,8 +138,8 @@ def check_carried(tree: Tree, chain: list[Joint], moving: list[Joint]) -> None:
             massless.append(joint.child)
     if massless:
         raise tree.fail(
-            f"no mass on link{'s' if len(massless) > 1 else ''} {', '.join(massless)}; every moving link needs an <inertial> "
-            "with a mass"
+            f"no mass on link{'s' if len(massless) > 1 else ''} {', '.join(massless)}; every moving link needs an "
+            "<inertial> with a mass"
         )
     if virtual:
         tree.notes.append(f"{', '.join(virtual)} without a mass: carried by what follows, as joints of one place")

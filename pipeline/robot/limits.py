@@ -46,7 +46,7 @@ def bounds(tree: Tree, joints: list[Joint], key: str, unlimited: Collection[str]
 
 
 def require_room(description: Description, key: str, values: Array) -> None:
-    """Refuse velocity or effort limits (n,) within which nothing could move: no override is like that, so the file's are."""
+    """Refuse velocity or effort limits (n,) within which nothing could move: no override is so, the file's are."""
     stuck = np.flatnonzero(values <= 0.0)
     if stuck.size:
         names = ", ".join(description.joints[i] for i in stuck)

@@ -1,4 +1,4 @@
-"""Where `package://name/...` and `model://name/...` lie: in ROS's or Gazebo's paths, or in an installed Python package."""
+"""Where `package://name/...` and `model://name/...` lie: in ROS's or Gazebo's paths, or in a Python package."""
 
 from __future__ import annotations
 
@@ -26,8 +26,9 @@ KNOWN = {"example-robot-data": "pip install 'selfmotion[robots]'"}
 
 
 def resolve(uri: str, beside: Path | None = None) -> Path | None:
-    """The file of a `package://`, `model://`, `file://` or plain name, which may be relative to the folder `beside`; None
-    if unknown.
+    """The file of a `package://`, `model://`, `file://` or plain name; None if unknown.
+
+    A plain name may be relative to the folder `beside`.
     """
     if uri.startswith("file:"):
         return Path(unquote(urlsplit(uri).path))
@@ -113,8 +114,9 @@ def _listed(*variables: str) -> list[str]:
 
 
 def find(name: str) -> Path:
-    """A robot description by package://, model:// or file:// name, absolute path, or path relative to the working directory
-    or the project.
+    """A robot description by package://, model:// or file:// name, or by a path.
+
+    A path may be relative to the working directory or to the project.
     """
     if name.startswith(SCHEMES):
         return model_file(name) or locate(name, "robot.urdf")

@@ -11,7 +11,7 @@ from pipeline.robot.tree import ZERO, Joint, Link, Tree
 def split_planar(tree: Tree) -> None:
     """Put joints <name>_x, <name>_y and <name>_yaw in the place of every planar joint, with links that have no mass.
 
-    x and y are those of the joint's frame where its axis is z; else they are turned with z onto the axis, the short way.
+    x and y are those of the joint's frame where its axis is z; else they are turned with z onto the axis.
     """
     for planar in [joint for joint in tree.joints.values() if joint.kind == "planar"]:
         size = float(np.linalg.norm(planar.axis))

@@ -43,7 +43,7 @@ def moments_of(matrix: Array) -> Vector:
 
 @dataclass
 class Link:
-    """One link. solid: whether the file gives it any shape to see or to touch. unknown: why its inertia is not known."""
+    """One link. solid: whether the file gives it a shape to see or to touch. unknown: why its inertia is not known."""
 
     name: str
     inertial: Inertial | None = None

@@ -10,7 +10,6 @@ from __future__ import annotations
 import difflib
 import xml.etree.ElementTree as ET
 from collections.abc import Collection, Mapping
-from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -38,8 +37,8 @@ def read(
 ) -> Description:
     """Load `file` and reduce it to the chain base -> end_effector; raises RobotError, one line, naming the culprit.
 
-    locked: positions [rad or m] of joints that are held. repair_inertia: whether inertias that no body can have give way
-    to the nearest possible ones. unlimited: `velocity`, `effort` or both, of which zero then means that there is no limit.
+    locked: positions [rad or m] of joints that are held. repair_inertia: whether inertias that no body can have give
+    way to the nearest possible ones. unlimited: `velocity`, `effort` or both: a limit of zero then means none.
     """
     file, locked = Path(file), dict(locked or {})
     tree = formats.load(file, end_effector)
@@ -71,8 +70,12 @@ def read(
     for joint in moving:
         inertia.check(tree, tree.group(joint.child, names), repair_inertia)
     inertia.check_carried(tree, chain, moving)
-    with suppress(RobotError):  # the root's counts where it floats only: see check_root
+    root_fault = ""
+    try:
         inertia.check(tree, tree.group(root, names), repair_inertia)
+    except RobotError as error:  # it counts where the base floats only
+        root_fault = str(error)
+        inertia.drop(tree, tree.group(root, names))
     if any(joint.armature for joint in moving):
         rotors = ",".join(f"{joint.armature:g}" for joint in moving)
         tree.notes.append(f"the file's rotor inertia is not used; robot.armature=[{rotors}] takes it")
@@ -95,6 +98,7 @@ def read(
         pictures=tuple(tree.pictures),
         held=held,
         notes=tuple(tree.notes),
+        root_fault=root_fault,
     )
 
 
@@ -123,8 +127,10 @@ def _chain(base: str, tip: str, carrier: Mapping[str, Joint], file: Path) -> lis
 
 
 def _held(tree: Tree, chain: list[Joint], locked: Mapping[str, float]) -> dict[str, float]:
-    """The position of every joint that does not move: what is locked, what mimics something that does not move, the rest
-    at zero. Raises RobotError for what can neither move nor stand.
+    """The position of every joint that does not move.
+
+    What is locked stands there, what mimics a joint that does not move stands by it, the rest off the chain at zero.
+    Raises RobotError for what can neither move nor stand.
     """
     on_chain = {joint.name for joint in chain}
 
@@ -155,8 +161,8 @@ def _held(tree: Tree, chain: list[Joint], locked: Mapping[str, float]) -> dict[s
                 )
         elif joint.kind not in MOVING:
             raise tree.fail(
-                f"joint '{joint.name}' in the chain is of type '{joint.kind}'; allowed: {', '.join(MOVING)}, planar, fixed; "
-                f"start after it (robot.base={joint.child}) or hold it (robot.locked.{joint.name}=0)"
+                f"joint '{joint.name}' in the chain is of type '{joint.kind}'; allowed: {', '.join(MOVING)}, planar, "
+                f"fixed; start after it (robot.base={joint.child}) or hold it (robot.locked.{joint.name}=0)"
             )
         elif joint.mimic is not None:
             raise tree.fail(
@@ -202,7 +208,7 @@ def _to_xml(tree: Tree) -> str:
     robot = ET.Element("robot", name=tree.name)
     for link in tree.links.values():
         element = ET.SubElement(robot, "link", name=link.name)
-        if link.inertial is not None:
+        if link.inertial is not None and link.mass > 0.0:
             inertial = ET.SubElement(element, "inertial")
             _origin(inertial, link.inertial.com, link.inertial.rpy)
             ET.SubElement(inertial, "mass", value=repr(link.inertial.mass))
@@ -244,9 +250,9 @@ def root_mass(description: Description) -> float:
 
 
 def check_root(description: Description) -> None:
-    """Refuse an inertia that no body has, of the root link or of what is bolted to it: it counts where the base floats."""
-    tree, names = _again(description)
-    inertia.check(tree, tree.group(description.base, names), repair=False)
+    """Refuse an impossible inertia of the root link or of what is bolted to it: it counts where the base floats."""
+    if description.root_fault:
+        raise RobotError(description.root_fault)
 
 
 def _again(description: Description) -> tuple[Tree, set[str]]:

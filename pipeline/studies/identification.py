@@ -30,6 +30,7 @@ from pipeline.common.workers import Workers
 from pipeline.config import documents
 from pipeline.config.compose import experiment
 from pipeline.config.documents import half_width
+from pipeline.config.found import Summary
 from pipeline.config.methods import GlobalOptions
 from pipeline.config.studies import IdentificationConfig
 from pipeline.methods.method import Context
@@ -57,7 +58,7 @@ class Printed:
     document: str
     place: str
     row: documents.Row
-    found: documents.Summary
+    found: Summary
 
     @property
     def motion(self) -> Key:
@@ -190,7 +191,7 @@ def _printed(config: IdentificationConfig) -> list[Printed]:
         for place, row in documents.read(name).rows:
             if row.masses == "no":
                 continue
-            if not isinstance(row.found, documents.Summary) or row.between is not None:
+            if not isinstance(row.found, Summary) or row.between is not None:
                 raise ConfigError(f"{name}, {place.place}, {row.quantity}: masses need a number of summary.csv")
             found.append(Printed(name, place.place, row, row.found))
     return found

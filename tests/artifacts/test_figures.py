@@ -78,6 +78,7 @@ def texts(figure: Figure) -> str:
     return "\n".join(legends + [text.get_text() for axes in figure.axes for text in axes.texts])
 
 
+@pytest.mark.slow
 def test_all_files_are_written_as_images(case: Case, tmp_path: Path) -> None:
     problem, motions = case
     folder = tmp_path / "new" / "run" / "figures"

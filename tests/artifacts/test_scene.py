@@ -15,9 +15,10 @@ from pipeline.artifacts.scene import box, corners
 from pipeline.build.problem import prepare
 from pipeline.evaluation.base import BaseMotion
 from pipeline.run.run import run
-from tests.support import composed
+from tests.support import FEW_STARTS, composed
 
 SMALL = (
+    *FEW_STARTS,
     "timing.steps=20",
     "method.global.optimised=2",
     "method.pmke.prediction_step=1",
@@ -32,6 +33,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return made
 
 
+@pytest.mark.slow
 def test_summary(folder: Path) -> None:
     table = pd.read_csv(folder / "summary.csv").set_index(["method", "optimum"])
     assert {"lsv", "inertia_weighted", "pmke", "global"} == set(table.index.get_level_values(0))
@@ -45,6 +47,7 @@ def test_summary(folder: Path) -> None:
     assert "| max floating path error [m] |" in text
 
 
+@pytest.mark.slow
 def test_trajectories_hold_the_base(folder: Path) -> None:
     table = pd.read_parquet(folder / "trajectories.parquet")
     summary = pd.read_csv(folder / "summary.csv").set_index(["method", "optimum"])
@@ -56,6 +59,7 @@ def test_trajectories_hold_the_base(folder: Path) -> None:
         assert abs(end["base_rz"]) == pytest.approx(summary.loc[key, "final_base_turn"], rel=1e-6)
 
 
+@pytest.mark.slow
 def test_the_base_moves_in_the_recording(folder: Path) -> None:
     table = pd.read_parquet(folder / "trajectories.parquet").query("method == 'lsv'")
     chunks = (
@@ -69,6 +73,7 @@ def test_the_base_moves_in_the_recording(folder: Path) -> None:
     np.testing.assert_allclose(turn[:, 0], np.abs(table["base_rz"]), atol=1e-6)
 
 
+@pytest.mark.slow
 def test_figures(folder: Path) -> None:
     assert (folder / "figures" / "base.png").stat().st_size > 10_000
 
@@ -91,6 +96,7 @@ def test_the_box_has_the_mass_and_inertia() -> None:
 def test_front_of_rotation_against_energy(tmp_path: Path) -> None:
     """The trade that the PMKE paper names: at least ten points, none dominated, each bound met."""
     words = (
+        *FEW_STARTS,
         "timing.steps=16",
         "method.global.optimised=4",
         "method.pareto.steps=6",

@@ -43,7 +43,8 @@ def motions(asked: Problem, guess: Callable[[Problem], Array]) -> list[Evaluatio
 
 @pytest.fixture
 def report(asked: Problem, motions: list[Evaluation], monkeypatch: pytest.MonkeyPatch) -> Report:
-    monkeypatch.setattr(tables, "printed_for", lambda name: PRINTED)
+    """Of the experiment `mine`, of which a paper prints two numbers."""
+    monkeypatch.setattr(tables, "printed_for", {"mine": PRINTED}.get)
     made = report_of(asked, motions, settings=RunConfig(name="mine"))
     return replace(made, seconds={"lsv": 0.5, "global": 2.5})
 
@@ -80,7 +81,8 @@ def test_printed_values_stand_beside_the_first_optimum_of_their_method(summary: 
 @pytest.mark.parametrize("file", EXPERIMENTS, ids=lambda file: file.stem)
 def test_every_printed_number_has_a_column_to_compare_it_with(file: Path, summary: pd.DataFrame) -> None:
     """A misspelt column would silently compare nothing."""
-    for method, values in printed_for(file.stem).values.items():
+    printed = printed_for(file.stem)
+    for method, values in printed.numbers.items():
         assert set(values) <= set(summary.columns), method
 
 
@@ -162,12 +164,9 @@ def test_a_sweep_without_any_summary_writes_nothing(tmp_path: Path) -> None:
     assert [file.name for file in tmp_path.iterdir()] == ["0_run"]
 
 
-def test_a_printed_zero_or_an_unknown_column_is_no_crash(
-    asked: Problem, motions: list[Evaluation], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_printed_zero_or_an_unknown_column_is_no_crash(report: Report, monkeypatch: pytest.MonkeyPatch) -> None:
     values = {"lsv": {"torque_integral": 0.0, "nonsense": 1.0}}
-    monkeypatch.setattr(tables, "printed_for", lambda name: Printed(values))
-    report = report_of(asked, motions, settings=RunConfig())
+    monkeypatch.setattr(tables, "printed_for", {"mine": Printed(values)}.get)
     with np.errstate(divide="ignore"):
         assert np.isnan(tables.summary(report)["difference_nonsense"][0])
         assert "printed 0" in tables.text(report)

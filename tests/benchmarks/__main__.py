@@ -37,7 +37,7 @@ def report(name: str, ours: list[float], theirs: list[float], note: str) -> None
     print(f"{name:<34} {np.median(ours):9.2f} {np.median(theirs):9.2f} {ratio:7.2f}   {note}")
 
 
-def predictions() -> None:
+def predictions(repeats: int = REPEATS) -> None:
     """Every prediction of PMKE on trajectory 3, with the guesses of a real run."""
     problem = prepare(check({}))
     calls: list[tuple[Any, ...]] = []
@@ -56,7 +56,7 @@ def predictions() -> None:
     arm = peer.PlanarArm.from_urdf(peer.ROBOT)
     program = peer.kinetic_energy_program(arm, options.horizon, options.prediction_step, options.tolerance)
     ours, theirs, gap = [], [], 0.0
-    for _ in range(REPEATS):
+    for _ in range(repeats):
         for call in calls:
             milliseconds, answer = timed(lambda call=call: window.solve(*call, tolerance=options.tolerance))
             ours.append(milliseconds)
@@ -66,7 +66,7 @@ def predictions() -> None:
     report("PMKE prediction (trajectory 3)", ours, theirs, f"{len(calls)} solves of one run; costs agree to {gap:.0e}")
 
 
-def fine_solve() -> None:
+def fine_solve(repeats: int = REPEATS) -> None:
     """The last stage of the global planner on trajectory 3: 101 points, 303 parameters, started from the stage before."""
     problem = prepare(check({}))
     options = GlobalOptions()
@@ -78,7 +78,7 @@ def fine_solve() -> None:
     program = peer.kinetic_energy_program(arm, len(problem.times) - 1, step, options.tolerance)
     path = problem.reference.position(problem.times[1:])
     ours, theirs = [], []
-    for _ in range(REPEATS):
+    for _ in range(repeats):
         milliseconds, (q, _, iterations) = timed(
             lambda: transcribe(problem, problem.times, guess).solve(tolerance=options.tolerance)
         )

@@ -33,7 +33,7 @@ def test_gravity() -> None:
     # Held still, a joint balances the weight of what it carries: no torque about the vertical.
     assert abs(held[0, 0]) < 1e-9
     assert np.abs(held[0, 1]) > 1.0
-    with pytest.raises(ConfigError, match=r"gravity = 'mars': allowed: none, earth, or three numbers m/s\^2"):
+    with pytest.raises(ConfigError, match=r"gravity = 'mars': must be none, earth or a list of 3 numbers m/s\^2"):
         composed("gravity=mars")
 
 

@@ -12,7 +12,10 @@ from pipeline.build.problem import prepare
 from pipeline.common.errors import InputError
 from tests.support import composed
 
-BODY = '<inertial><origin xyz="{com} 0 0"/><mass value="{mass}"/><inertia ixx="0.001" iyy="0.008" izz="0.008" ixy="0" ixz="0" iyz="0"/></inertial>'
+BODY = (
+    '<inertial><origin xyz="{com} 0 0"/><mass value="{mass}"/>'
+    '<inertia ixx="0.001" iyy="0.008" izz="0.008" ixy="0" ixz="0" iyz="0"/></inertial>'
+)
 POINT = '<inertial><origin xyz="0.15 0 0"/><mass value="0.5"/></inertial>'
 WORDS = ("robot.end_effector=tool", "robot.q_init=[0.3,0.8,-1.2]", "path.length=0.15", "path.direction=120")
 
@@ -25,7 +28,8 @@ def planar(limit: str = 'velocity="5" effort="20"', last: str = BODY.format(com=
         if k:
             parts.append(
                 f'<joint name="j{k}" type="revolute"><parent link="l{k - 1}"/><child link="l{k}"/>'
-                f'<origin xyz="{0.3 * (k > 1)} 0 0"/><axis xyz="0 0 1"/><limit lower="-3.1" upper="3.1" {limit}/></joint>'
+                f'<origin xyz="{0.3 * (k > 1)} 0 0"/><axis xyz="0 0 1"/>'
+                f'<limit lower="-3.1" upper="3.1" {limit}/></joint>'
             )
     tool = '<joint name="tf" type="fixed"><parent link="l3"/><child link="tool"/><origin xyz="0.3 0 0"/></joint>'
     return f'<robot name="pl">{"".join(parts)}<link name="tool"/>{tool}</robot>'

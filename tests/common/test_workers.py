@@ -137,6 +137,7 @@ SIM1 = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("store", [False, True])
 def test_the_planner_gives_the_same_with_one_worker_and_two(tmp_path: Path, store: bool) -> None:
     asked = config.check(SIM1)

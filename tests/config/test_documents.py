@@ -15,29 +15,29 @@ def test_numbers_as_the_documents_print_them() -> None:
     third = printed_for("traj3")
     assert third.document == "PMKE paper (Appl. Sci. 2021, 11, 2346), Table 5 and Section 3.2"
     assert third.note.startswith("The LSV energy")
-    assert third.values["lsv"] == {"kinetic_energy_integral": 2.17e-2, "singular_time": 6.5}
-    assert third.values["pmke"]["peak_velocity_1"] == 0.25
-    assert third.values["global"] == {"kinetic_energy_integral": 6.09e-3}
-    assert printed_for("sim5").values["global"]["peak_power_1"] == 5.814
-    assert printed_for("case1").values == {"pontryagin_as_printed": {"final_error": 0.0026}}
+    assert third.numbers["lsv"] == {"kinetic_energy_integral": 2.17e-2, "singular_time": 6.5}
+    assert third.numbers["pmke"]["peak_velocity_1"] == 0.25
+    assert third.numbers["global"] == {"kinetic_energy_integral": 6.09e-3}
+    assert printed_for("sim5").numbers["global"]["peak_power_1"] == 5.814
+    assert printed_for("case1").numbers == {"pontryagin_as_printed": {"final_error": 0.0026}}
 
 
 def test_a_misprint_is_read_as_what_was_meant() -> None:
-    assert printed_for("traj1").values["lsv"]["kinetic_energy_integral"] == 8.81e-4
+    assert printed_for("traj1").numbers["lsv"]["kinetic_energy_integral"] == 8.81e-4
 
 
 def test_what_is_no_cell_of_the_table_is_left_out() -> None:
     """A peak up to a moment, a largest positive velocity, words, and what belongs to a later optimum."""
-    assert "peak_velocity_1" not in printed_for("traj3").values["lsv"]
-    assert "peak_velocity_3" not in printed_for("traj2").values["lsv"]
-    assert printed_for("case2").values == {}
-    assert printed_for("sim1_validation").values["global"]["kinetic_energy_integral"] == 0.0528
+    assert "peak_velocity_1" not in printed_for("traj3").numbers["lsv"]
+    assert "peak_velocity_3" not in printed_for("traj2").numbers["lsv"]
+    assert printed_for("case2").numbers == {}
+    assert printed_for("sim1_validation").numbers["global"]["kinetic_energy_integral"] == 0.0528
 
 
 def test_the_calculus_of_variations_beside_the_planner() -> None:
-    printed = printed_for("sim1_validation").values
+    printed = printed_for("sim1_validation").numbers
     assert printed["calculus_of_variations"] == {"kinetic_energy_integral": 0.0532}
-    assert printed_for("sim1").values == printed
+    assert printed_for("sim1").numbers == printed
 
 
 def test_nothing_is_printed_of_an_experiment_of_ours() -> None:
@@ -55,6 +55,6 @@ def test_what_a_document_says_of_runs_is_of_experiments_that_exist(name: str) ->
 
 @pytest.mark.parametrize("experiment", EXPERIMENTS)
 def test_a_printed_number_has_a_method_to_compare_it_with(experiment: str) -> None:
-    printed = set(printed_for(experiment).values)
+    printed = set(printed_for(experiment).numbers)
     own = set(composed(f"+experiment={experiment}").methods)
     assert printed <= own | {"calculus_of_variations"}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import os
 from dataclasses import replace
 
 import numpy as np
@@ -28,7 +27,6 @@ PAPER = ("method.global.starts=population", "method.global.coarse_steps=12")
 FEW = (*PAPER, *(f"method.global.{key}" for key in ("configurations=12", "candidates=150", "optimised=12")))
 GRID = "method.global.starts=dynamic_programming"
 ALONE = "method.global.solver=ipopt"
-WORKERS = Workers(min(2, os.cpu_count() or 1))
 
 
 def configured(*words: str) -> RunConfig:
@@ -40,7 +38,7 @@ def configured(*words: str) -> RunConfig:
 def solved(*words: str) -> tuple[Problem, list[Evaluation]]:
     config = configured(*words)
     problem = prepare(config)
-    solutions = global_planner(problem, config.method.global_, Context(config.seed, WORKERS))
+    solutions = global_planner(problem, config.method.global_, Context(config.seed))
     return problem, [evaluate(problem, solution) for solution in solutions]
 
 

@@ -42,7 +42,12 @@ PROBLEMS = {
     "limits": (*SMALL, "limits=joint"),
     "torque": (*SMALL, "objective=torque"),
     "floating": (*SMALL, "base=free", "base.mass=20", "base.inertia=1"),
-    "held": (*SMALL, "objective=reaction", "method.pareto.objectives=[reaction_force,torque]"),
+    "held": (
+        *SMALL,
+        "objective=reaction",
+        "method.pmke.objective=kinetic_energy",
+        "method.pareto.objectives=[reaction_force,torque]",
+    ),
     "r = 2": (*SMALL, "robot=planar4r"),
 }
 BASELINES = {"lsv", "inertia_weighted", "pmke", "receding", "global", "pareto"}

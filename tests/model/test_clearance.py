@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -14,7 +15,18 @@ from pipeline.model.obstacles import Obstacles
 from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Solution, Status, Trajectory
 from pipeline.robot.shapes import Shape, link_shapes
-from tests.support import BALL, BOX, ROBOTS, ROD, composed, segment_distances, with_shapes, within_limits
+from tests.support import (
+    BALL,
+    BOX,
+    FEW,
+    FEW_STARTS,
+    ROBOTS,
+    ROD,
+    composed,
+    segment_distances,
+    with_shapes,
+    within_limits,
+)
 
 
 @pytest.mark.parametrize("name", ["planar4r", "panda", "xarm7"])
@@ -55,12 +67,17 @@ def line(margin: float, **changes: str) -> Problem:
     return prepare(composed(*overrides, ball, f"obstacles.margin={margin}", *[f"{k}={v}" for k, v in changes.items()]))
 
 
-def test_the_planner_keeps_its_clearance_between_knots_too() -> None:
+@cache
+def through_the_ball() -> tuple[Problem, Solution]:
     free = replace(line(0.03), obstacles=None)
-    there = line(0.03)
-    without = global_planner(free)[0]
+    return free, global_planner(free, FEW)[0]
+
+
+@pytest.mark.slow
+def test_the_planner_keeps_its_clearance_between_knots_too() -> None:
+    there, free, without = line(0.03), *through_the_ball()
     assert evaluate(there, without).clearance_between < 0.02, "the ball is not in the way: the test shows nothing"
-    best = evaluate(there, global_planner(there)[0])
+    best = evaluate(there, global_planner(there, FEW)[0])
     assert best.status is Status.SOLVED
     assert best.clearance.min() >= 0.03 - 1e-9
     assert best.clearance_between >= 0.03 - 1e-9
@@ -68,8 +85,7 @@ def test_the_planner_keeps_its_clearance_between_knots_too() -> None:
 
 
 def test_a_motion_that_breaks_a_promised_clearance_is_unconfirmed() -> None:
-    there = line(0.03)
-    through = global_planner(replace(there, obstacles=None))[0]
+    there, (_, through) = line(0.03), through_the_ball()
     judged = evaluate(
         there,
         Solution(
@@ -87,6 +103,7 @@ def test_a_start_too_close_is_refused() -> None:
         line(0.5)
 
 
+@pytest.mark.slow
 def test_an_obstacle_on_the_path_is_named() -> None:
     blocked = composed(
         "robot=planar4r",
@@ -94,6 +111,7 @@ def test_an_obstacle_on_the_path_is_named() -> None:
         "path.direction=170",
         "timing.duration=2",
         "timing.steps=12",
+        *FEW_STARTS,
         "method.global.optimised=4",
         "+obstacles.shapes.wall={kind: box, center: [0.563, 0.24, 0.0], size: [0.04, 0.04, 0.1]}",
         "obstacles.margin=0.01",

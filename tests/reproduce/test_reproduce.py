@@ -20,6 +20,7 @@ from PIL import Image
 from pipeline.common.errors import ConfigError
 from pipeline.config import documents
 from pipeline.config.documents import half_width
+from pipeline.config.found import Summary
 from pipeline.reproduce import __main__ as reproduce
 from pipeline.reproduce import drawings as document_figures
 from pipeline.reproduce import pages as reproduction_pages
@@ -223,7 +224,7 @@ def test_a_number_that_no_run_holds_differs_and_says_so(reproduced: Path) -> Non
     assert list(lost["place"]) == ["Figure 3", "Figure 4"]
     assert set(lost["verdict"]) == {"differs"}
     assert set(lost["note"]) == {"no run of experiment case1"}
-    row = replace(document.rows[0][1], found=documents.Summary("case4a", "pontryagin_as_printed", 7, "final_error"))
+    row = replace(document.rows[0][1], found=Summary("case4a", "pontryagin_as_printed", 7, "final_error"))
     with pytest.raises(ResultError, match="case4a: no pontryagin_as_printed 7"):
         recompute(row.found, runs)
     assert judge(row, 0.00261) == "reproduced"

@@ -1,4 +1,4 @@
-"""Every URDF of example-robot-data, from its root to the last link of its longest chain: read, or refused for what it is."""
+"""Every URDF of example-robot-data, from its root to the last link of its longest chain: read, or refused rightly."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ def write(tmp_path: Path) -> Callable[[str], Path]:
 
 
 def test_the_nearest_possible_inertia() -> None:
-    """diag(0.01, 0.01, 0.5) has the second moments 0.25, 0.25 and -0.24: without the last one, diag(0.25, 0.25, 0.5)."""
+    """diag(0.01, 0.01, 0.5) has second moments 0.25, 0.25 and -0.24; without the last one, diag(0.25, 0.25, 0.5)."""
     mended = nearest(Inertial(2.0, (1.0, 2.0, 3.0), moments=(0.01, 0.01, 0.5, 0.0, 0.0, 0.0)))
     np.testing.assert_allclose(mended.moments, (0.25, 0.25, 0.5, 0.0, 0.0, 0.0), atol=1e-15)
     assert (mended.mass, mended.com) == (2.0, (1.0, 2.0, 3.0))
@@ -84,7 +84,7 @@ def test_what_one_link_cannot_have_a_heavier_one_may_carry(write: Callable[[str]
     assert note.startswith("foot: no body alone has that inertia; hand has the sum")
     q = np.array([[0.7, 0.15, -1.2, 2.1]])
     masses = [Arm(urdf.read(write(text), "hand")).mass_matrix(q)[0] for text in (bolted, ROBOT)]
-    # The wrist turns about x of the hand's frame: e' I e of the foot's stated moments in the hand's axes, and its lever.
+    # The wrist turns about x of the hand's frame: e' I e of the foot's stated moments there, and its lever.
     axis = Rotation.from_euler("xyz", (0.4, -0.3, 0.8)).inv().apply([1.0, 0.0, 0.0])
     lever = np.cross([1.0, 0.0, 0.0], [0.3, 0.1, 0.2])
     added = axis @ (1e-6 * np.ones((3, 3))) @ axis + 1e-6 * lever @ lever

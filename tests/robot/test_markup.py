@@ -20,8 +20,8 @@ def test_prefixes_need_no_meaning() -> None:
 
 @pytest.mark.parametrize(
     "data",
-    [b"", b"<robot>", b"<robot/><robot/>", b'<?xml version="1.0" encoding="none"?><r/>', b"\xff\xfe\x00", b'<a b="1" b="2"/>',
-     b"<a>&nothing;</a>", b"<a>\xff</a>", b"<a>" * 5000 + b"</a>" * 5000],
+    [b"", b"<robot>", b"<robot/><robot/>", b'<?xml version="1.0" encoding="none"?><r/>', b"\xff\xfe\x00",
+     b'<a b="1" b="2"/>',     b"<a>&nothing;</a>", b"<a>\xff</a>", b"<a>" * 5000 + b"</a>" * 5000],
 )  # fmt: skip
 def test_what_is_no_document_is_one_line(data: bytes) -> None:
     with pytest.raises(RobotError, match=r"^robot\.urdf = arm\.urdf: ") as caught:

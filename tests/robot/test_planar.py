@@ -18,7 +18,8 @@ TURN = joint("turn", "cart", "hand", "continuous", "1 0 0")
 
 
 def robot(axis: str) -> str:
-    return f'<robot name="r"><link name="floor"/>{joint("drive", "floor", "cart", "planar", axis)}{link("cart")}{TURN}{link("hand")}</robot>'
+    drive = joint("drive", "floor", "cart", "planar", axis)
+    return f'<robot name="r"><link name="floor"/>{drive}{link("cart")}{TURN}{link("hand")}</robot>'
 
 
 def test_as_drake_moves_it(tmp_path: Path) -> None:

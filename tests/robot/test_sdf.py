@@ -223,7 +223,8 @@ def test_an_included_model_is_the_same_arm(write: Callable[[str, str], Path], mo
     monkeypatch.setenv("GZ_SIM_RESOURCE_PATH", str(arm.parent))
     plain = Arm(urdf.read(folder / "model.sdf", "hand"))
     for uri in ("model://some_arm", "some_arm/model.sdf"):
-        outer = f'<sdf version="1.9"><world name="w"><include><uri>{uri}</uri><pose>1 2 3 0 0 0</pose></include></world></sdf>'
+        include = f"<include><uri>{uri}</uri><pose>1 2 3 0 0 0</pose></include>"
+        outer = f'<sdf version="1.9"><world name="w">{include}</world></sdf>'
         got = Arm(urdf.read(write("outer.world", outer), "hand"))
         np.testing.assert_allclose(got.position(Q), plain.position(Q), atol=1e-14)
         np.testing.assert_allclose(got.mass_matrix(Q), plain.mass_matrix(Q), atol=1e-13)

@@ -352,6 +352,7 @@ def test_bad_input_as_a_process(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_a_bad_robot_as_a_process(tmp_path: Path) -> None:
     """Neither Drake nor Hydra adds a line of its own."""
     file = tmp_path / "arm.sdf"

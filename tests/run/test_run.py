@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import functools
 import json
-import os
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,10 +18,9 @@ from pipeline.artifacts.recording.blueprint import slug
 from pipeline.artifacts.recording.recording import read_series
 from pipeline.build.problem import prepare
 from pipeline.common.errors import ConfigError, PathError, RobotError
-from pipeline.common.workers import Workers
 from pipeline.config import run as schema
 from pipeline.config.compose import checked
-from pipeline.config.methods import GlobalOptions
+from pipeline.config.methods import LsvOptions
 from pipeline.evaluation.evaluation import Evaluation, evaluate
 from pipeline.methods.global_planner.planner import global_planner
 from pipeline.methods.lsv import lsv
@@ -31,9 +30,8 @@ from pipeline.problem.problem import Boundary, Problem
 from pipeline.problem.solution import Status
 from pipeline.run.solve import solve
 from tests.run.test_main import ROOT, Answer, call, command
-from tests.support import RUN_FILES
+from tests.support import FEW, FEW_STARTS, RUN_FILES
 
-FEW = tuple(f"method.global.{key}" for key in ("candidates=300", "optimised=8"))
 FIGURES = ("stroboscopic", "joints", "energy", "torques")
 
 
@@ -61,7 +59,14 @@ def strict_json(text: str) -> dict[str, Any]:
 @pytest.fixture(scope="module")
 def traj3(tmp_path_factory: pytest.TempPathFactory) -> tuple[Answer, Path]:
     folder = tmp_path_factory.mktemp("traj3")
-    answer = command("+experiment=traj3", "seed=7", f"hydra.run.dir={folder}/results", folder=folder)
+    answer = command(
+        "+experiment=traj3",
+        "seed=7",
+        *FEW_STARTS,
+        "parallel.workers=1",
+        f"hydra.run.dir={folder}/results",
+        folder=folder,
+    )
     return answer, folder / "results"
 
 
@@ -160,9 +165,9 @@ class TestTraj3:
 
 @functools.cache
 def solved(number: int, method: str) -> tuple[Problem, list[Evaluation]]:
-    config = configured(f"+experiment=traj{number}", f"methods=[{method}]", *FEW)
+    config = configured(f"+experiment=traj{number}", f"methods=[{method}]", *FEW_STARTS)
     problem = prepare(config)
-    solutions, seconds = solve(problem, config, Context(1, Workers(min(2, os.cpu_count() or 1))))
+    solutions, seconds = solve(problem, config, Context())
     assert seconds[method] > 0
     return problem, [evaluate(problem, solution) for solution in solutions]
 
@@ -216,11 +221,12 @@ def test_global(number: int, energy: float) -> None:
 # --- failures --------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_failing_method_fails_the_run_and_leaves_everything(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    words = ["+experiment=traj1", "methods=[lsv,global]", "timing.steps=26", "parallel.workers=1", *FEW]
+    words = ["+experiment=traj1", "methods=[lsv,global]", "timing.steps=26", "parallel.workers=1", *FEW_STARTS]
     answer = call(monkeypatch, capfd, *words, "method.global.max_iterations=1", "hydra.run.dir=results")
     folder = tmp_path / "results"
     assert answer.code == 1
@@ -243,7 +249,7 @@ def test_a_motion_that_was_not_found_does_not_cost_nothing(
 ) -> None:
     """The arm standing still is no result: 0 J s in the tables would be the best of all."""
     monkeypatch.chdir(tmp_path)
-    words = ["+experiment=traj1", "methods=[global]", "timing.steps=13", "parallel.workers=1", *FEW]
+    words = ["+experiment=traj1", "methods=[global]", "timing.steps=13", "parallel.workers=1", *FEW_STARTS]
     call(monkeypatch, capfd, *words, "method.global.max_iterations=1", "hydra.run.dir=results")
     (row,) = pd.read_csv(tmp_path / "results" / "summary.csv").to_dict("records")
     assert row["status"] == "not converged"
@@ -268,7 +274,9 @@ ROWS = np.array([[0.45, 0.02], [0.40, 0.06], [0.36, 0.05], [0.33, 0.10]])
 
 @pytest.mark.parametrize("relative", [False, True])
 def test_way_points(points: Callable[[Any], Path], relative: bool) -> None:
-    config = configured("path=waypoints", f"path.file={points(ROWS)}", f"path.relative={str(relative).lower()}")
+    config = configured(
+        "path=waypoints", f"path.file={points(ROWS)}", f"path.relative={str(relative).lower()}", "timing.steps=26"
+    )
     problem = prepare(config)
     here = prepared().task.value(np.array([config.robot.q_init]))[0]
     shift = here - ROWS[0] if relative else 0.0
@@ -279,8 +287,8 @@ def test_way_points(points: Callable[[Any], Path], relative: bool) -> None:
         assert np.linalg.norm(dense - point, axis=1).min() < 1e-4
     if relative:
         np.testing.assert_allclose(problem.q_init, config.robot.q_init, atol=1e-9)
-    solutions = [lsv(problem)[0], pmke(problem)[0]]
-    solutions += global_planner(problem, GlobalOptions(candidates=60, optimised=3))
+    solutions = [lsv(problem, LsvOptions(dt=0.05))[0], pmke(problem)[0]]
+    solutions += global_planner(problem, replace(FEW, optimised=3))
     assert all(evaluate(problem, solution).status is Status.SOLVED for solution in solutions)
 
 
@@ -301,8 +309,8 @@ def test_a_path_can_say_where_it_starts() -> None:
 @pytest.mark.parametrize("law", ["constant_speed", "quintic", "raised_cosine"])
 def test_timing_laws_run(law: str) -> None:
     problem = prepared("+experiment=traj1", f"timing={law}", "timing.duration=10.0", "timing.steps=26")
-    solutions = [lsv(problem)[0], pmke(problem)[0]]
-    solutions += global_planner(problem, GlobalOptions(candidates=60, optimised=3))
+    solutions = [lsv(problem, LsvOptions(dt=0.05))[0], pmke(problem)[0]]
+    solutions += global_planner(problem, replace(FEW, optimised=3))
     motions = [evaluate(problem, solution) for solution in solutions]
     assert [motion.status for motion in motions] == [Status.SOLVED] * len(motions)
     costs = [motion.energy_integral_spline for motion in motions[:3]]

@@ -11,6 +11,7 @@ from pipeline.build.problem import prepare
 from pipeline.common.errors import ConfigError
 from pipeline.common.workers import Workers
 from pipeline.config import documents
+from pipeline.config.found import Summary
 from pipeline.config.studies import IdentificationConfig
 from pipeline.evaluation.evaluation import evaluate
 from pipeline.methods.lsv import lsv
@@ -96,6 +97,7 @@ def test_numbers_are_those_of_the_evaluation() -> None:
         assert found[f"peak_power_{j + 1}"] == pytest.approx(e.power[:, j].max(), rel=1e-6)
 
 
+@pytest.mark.slow
 def test_the_fit_starts_at_the_masses_of_the_arm_and_recovers_others(
     as_printed: Arm, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -108,9 +110,9 @@ def test_the_fit_starts_at_the_masses_of_the_arm_and_recovers_others(
     for key, q in motions.items():
         numbers = identification.quantities(identification._problem(key[0], true), q)
         for column in columns:
-            found = documents.Summary(key[0], key[1], key[2], column)
+            found = Summary(key[0], key[1], key[2], column)
             row = documents.Row(quantity=column, printed=f"{numbers[column]:.6e}", found=found, masses="fit")
-            printed.append(identification.Printed("made", key[0], row))
+            printed.append(identification.Printed("made", key[0], row, found))
     monkeypatch.setattr(identification, "_printed", lambda config: printed)
     found = identification.identify(as_printed, IdentificationConfig(), 1, Workers(1))
     np.testing.assert_allclose(found.masses["printed"], PRINTED)

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from pydrake.multibody.plant import MultibodyPlant
 
+from pipeline.common.errors import RobotError
 from pipeline.robot.formats import plant as drake
 from pipeline.robot.markup import parse
 from pipeline.robot.numbers import Vector, number, numbers
@@ -74,16 +75,16 @@ def read(root: ET.Element, file: Path, end_effector: str) -> Tree:
     bodies = {link for link in links if link.endswith(INERTIAL)}
     drake.fill(tree, plant, models, lambda thing: str(thing.name()), links)
     for link in bodies:
-        joint = next(joint for joint in tree.joints.values() if joint.child == link)
+        axes = next(one for one in tree.joints.values() if one.child == link)
         inertial = links[link].inertial
-        del tree.joints[joint.name], tree.links[link]
+        del tree.joints[axes.name], tree.links[link]
         assert inertial is not None
-        tree.links[joint.parent].inertial = Inertial(inertial.mass, joint.xyz, joint.rpy, inertial.moments)
+        tree.links[axes.parent].inertial = Inertial(inertial.mass, axes.xyz, axes.rpy, inertial.moments)
     efforts = _efforts(root, classes, tree)
     for element in top.iter("joint"):
-        joint = tree.joints[element.get("name", "")]
-        joint.armature = float(element.get("armature", "0"))
-        joint.limit = {**joint.limit, **efforts.get(joint.name, {})}
+        if (joint := tree.joints.get(element.get("name", ""))) is not None:
+            joint.armature = float(element.get("armature", "0"))
+            joint.limit = {**joint.limit, **efforts.get(joint.name, {})}
     _couple(root, tree)
     return tree
 
@@ -126,7 +127,7 @@ def _classes(root: ET.Element) -> Classes:
 
 
 def _over(defaults: Mapping[str, str], element: ET.Element) -> dict[str, str]:
-    """An element's attributes over its defaults: one way to state an orientation or moments takes the place of another."""
+    """An element's attributes over its defaults: one way to state an orientation takes the place of another."""
     replaced = TURNS if any(turn in element.attrib for turn in TURNS) else ()
     return {**{key: value for key, value in defaults.items() if key not in replaced}, **element.attrib}
 
@@ -204,6 +205,10 @@ def _weighs(geom: ET.Element) -> bool:
 def _inertial(inertial: ET.Element, where: str) -> Inertial:
     moments: Vector = (0.0,) * 6
     if "fullinertia" in inertial.attrib:
+        if turned := [turn for turn in TURNS if turn in inertial.attrib]:
+            raise RobotError(
+                f"{where} the fullinertia and a {turned[0]} of its axes, which MuJoCo refuses; give one of them"
+            )
         moments = numbers(inertial.attrib["fullinertia"], 6, f"{where} the fullinertia")
     elif "diaginertia" in inertial.attrib:
         moments = (*numbers(inertial.attrib["diaginertia"], 3, f"{where} the diaginertia"), 0.0, 0.0, 0.0)

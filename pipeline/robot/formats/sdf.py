@@ -1,5 +1,5 @@
-"""An SDF model as a `Tree`. Drake places its frames; masses and limits are read here, since SDF's own defaults (1 kg and
-1 kg m^2 where nothing is stated) are no robot's. Pictures, meshes and plugins are dropped.
+"""An SDF model as a `Tree`. Drake places its frames; masses and limits are read here, since SDF's own defaults (1 kg
+and 1 kg m^2 where nothing is stated) are no robot's. Pictures, meshes and plugins are dropped.
 
 Names are those of links and joints; where nested models use one twice, those below the first come with their models.
 """

@@ -1,4 +1,4 @@
-"""A URDF as a `Tree`. What moves nothing and is not touched (pictures, transmissions, simulators' blocks) is dropped."""
+"""A URDF as a `Tree`. What moves nothing and is not touched (pictures, simulators' blocks) is dropped."""
 
 from __future__ import annotations
 

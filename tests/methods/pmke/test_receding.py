@@ -15,7 +15,7 @@ from pipeline.problem.costs import integrals
 from pipeline.problem.objective import Objective
 from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Status
-from tests.support import composed
+from tests.support import FEW, composed
 
 WINDOW = RecedingOptions(prediction_step=0.2, horizon=5, update_interval=0.6)
 
@@ -24,6 +24,7 @@ def trajectory3(*overrides: str) -> Problem:
     return prepare(composed("path=line", "timing.steps=50", *overrides))
 
 
+@pytest.mark.slow
 def test_limits_hold_at_every_executed_knot_and_the_cost_is_near_the_optimum() -> None:
     asked = trajectory3("limits.velocity=0.32", "limits=joint")
     done = receding(asked, WINDOW)[0]
@@ -32,7 +33,7 @@ def test_limits_hold_at_every_executed_knot_and_the_cost_is_near_the_optimum() -
     assert max(judged.limit_excess.values()) <= 1e-6
     assert judged.limit_excess["velocity"] > -0.2, "the limit is not felt: the test shows nothing"
     assert judged.tracking_error.max() < 1e-7
-    best = evaluate(asked, global_planner(asked)[0])
+    best = evaluate(asked, global_planner(asked, FEW)[0])
     assert judged.objective < 1.1 * best.objective
     log = done.statistics["predictions"]
     assert [round(entry["time"], 6) for entry in log] == pytest.approx(np.arange(0, 10, 0.6).tolist())
@@ -52,6 +53,7 @@ def test_a_window_knows_the_velocity_it_comes_with() -> None:
     assert integrals(moving, times, q).integrals["torque"] == pytest.approx(0.2 * (tau**2).sum(), rel=1e-12)
 
 
+@pytest.mark.slow
 def test_torque_as_the_objective_of_the_predictions_costs_less_torque() -> None:
     asked = trajectory3()
     options = PmkeOptions(prediction_step=0.5, update_interval=0.5, horizon=4, objective="torque")
@@ -59,12 +61,13 @@ def test_torque_as_the_objective_of_the_predictions_costs_less_torque() -> None:
     assert interpolated.status is Status.SOLVED
     by_energy = evaluate(asked, receding(asked, WINDOW)[0])
     by_torque = evaluate(asked, receding(asked, replace(WINDOW, objective="torque"))[0])
-    best = evaluate(asked, global_planner(replace(asked, objective=Objective({"torque": 1.0})))[0])
+    best = evaluate(asked, global_planner(replace(asked, objective=Objective({"torque": 1.0})), FEW)[0])
     assert by_torque.status is by_energy.status is Status.SOLVED
     assert best.torque_integral[-1] * 0.9 < by_torque.torque_integral[-1] < 0.8 * by_energy.torque_integral[-1]
     assert by_torque.energy_integral[-1] > by_energy.energy_integral[-1]
 
 
+@pytest.mark.slow
 def test_what_cannot_be_met_is_said() -> None:
     asked = trajectory3("limits.velocity=0.12", "timing.steps=25")
     done = receding(asked, WINDOW)[0]

@@ -1,0 +1,47 @@
+"""The benchmarks run, once and small: their times are not judged, what they compare is."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from tests.benchmarks import __main__ as benchmarks
+from tests.benchmarks import planner
+from tests.support import FEW_STARTS
+
+
+def line_of(name: str, out: str) -> list[float]:
+    """Our time, the peer's and their ratio."""
+    (found,) = re.findall(rf"^{re.escape(name)} +(\S+) +(\S+) +(\S+) ", out, re.M)
+    return [float(number) for number in found]
+
+
+@pytest.mark.slow
+def test_small_programs(capsys: pytest.CaptureFixture[str]) -> None:
+    benchmarks.predictions(repeats=1)
+    benchmarks.fine_solve(repeats=1)
+    out = capsys.readouterr().out
+    for name in ("PMKE prediction (trajectory 3)", "fine global solve (303 parameters)"):
+        assert all(number > 0 for number in line_of(name, out))
+    assert float(re.findall(r"costs agree to (\S+)", out)[0]) < 1e-4
+    assert float(re.findall(r"motions agree to (\S+) rad", out)[0]) < 1e-4
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["sim1", "sim5"])
+def test_the_planner_beside_its_peer(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """sim1: energy, free, with dynamic programming beside it; sim5: a cycle with limits."""
+    planner.simulation(name, *FEW_STARTS, "method.global.optimised=3", "timing.steps=24")
+    out = capsys.readouterr().out
+    assert all(number > 0 for number in line_of(f"{name}, population", out))
+    costs = {label: float(cost) for label, cost in re.findall(r"^  (ours|peer|dp) +(\S+)", out, re.M)}
+    assert costs["ours"] == pytest.approx(costs["peer"], rel=1e-5)
+    assert float(re.findall(r"costs within (\S+),", out)[0]) < 1e-9
+    assert float(re.findall(r"limits kept to (\S+)", out)[0]) < 1e-6
+
+
+@pytest.mark.parametrize("words", [["large"], ["planner", "sim9"]])
+def test_an_unknown_part_is_refused(words: list[str]) -> None:
+    with pytest.raises(SystemExit, match="not one of"):
+        benchmarks.main(words)
