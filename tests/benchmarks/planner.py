@@ -65,23 +65,15 @@ class Peer:
             self.construction += time.process_time() - begin
         return self.programs[key]
 
-<<<<<<< HEAD
     def optimise(
         self, problem: Problem, times: Array, guess: Array, options: GlobalOptions, keep_off: float = 0.0
     ) -> Optimum:
         """What `optimum.optimise` does by Drake's IPOPT."""
-=======
-    def _solve(
-        self, problem: Problem, times: Array, guess: Array, options: GlobalOptions, keep_off: float = 0.0
-    ) -> Optimum:
-        assert not keep_off, "the peer knows no obstacles"
->>>>>>> main
         q, cost, statistics = self.program(problem, times, options).solve(guess)
         status = statistics["return_status"]
         return Optimum(q, cost, status in CONVERGED, status)
 
 
-<<<<<<< HEAD
 class Plan:
     """One problem, its starts, and both sides' way from them to all optima."""
 
@@ -134,36 +126,6 @@ def simulation(name: str) -> None:
     ours, theirs = (float(np.median(milliseconds[side])) for side in ("ours", "peer"))
     note = f"{len(plan.motions)} starts; the peer's functions took {plan.peer.construction:.1f} s besides"
     print(f"{name:<24} {ours:9.0f} {theirs:9.0f} {ours / theirs:7.2f} {1e3 * plan.drawn:11.0f}   {note}", flush=True)
-=======
-def simulation(name: str, *words: str) -> None:
-    """One line for the multi-start, one for `starts=dynamic_programming` where that applies, and the optima of all."""
-    with initialize_config_dir(str(peer.PROJECT / "conf"), version_base="1.3"):
-        config = checked(compose("config", overrides=[f"+experiment={name}", *words]))
-    problem, options = prepare(config), config.method.global_
-    grids = planner.refinement(problem.times, options.coarse_steps)
-    motions, _ = planner._starts(problem, grids[0], options, np.random.default_rng(config.seed))
-    ours, theirs = Side(optimum._optimise), Peer()
-    sides = (ours, theirs)
-    for number, motion in enumerate(motions):
-        for side in sides if number % 2 else sides[::-1]:
-            side.starts.append(side.run(optimum.optimise_start, (problem, grids[0], options), motion))
-    for side in sides:
-        basins = planner._basins(problem, side.starts, options)
-        fine = [side.run(optimum.refine, (problem, grids, options), side.starts[basin]) for basin in basins]
-        side.optima = keep(problem, options, fine)
-    counts = [sum(start.converged for start in side.starts) for side in sides]
-    note = f"of {len(motions)} starts {counts[0]} and {counts[1]} converged; CasADi built its functions in"
-    line(f"{name}, population", ours.seconds, theirs.seconds, f"{note} {theirs.construction:.2f} s besides")
-    found = {"ours": ours.optima, "peer": theirs.optima}
-    if not problem.objective.second_order:
-        begin = time.perf_counter()
-        solutions = global_planner(problem, replace(options, starts="dynamic_programming"), Context(config.seed))
-        seconds = time.perf_counter() - begin
-        grown = np.array([solution.trajectory.q for solution in solutions if solution.status is Status.SOLVED])
-        costs = objective_values(problem, problem.times, grown)
-        found["dp"] = [Optimum(q, float(cost), True, "") for q, cost in zip(grown, costs, strict=True)]
-        line(f"{name}, dynamic_programming", seconds, theirs.seconds, "the whole planner against the same peer")
->>>>>>> main
     for label, optima in found.items():
         print(f"  {label:<5}{'  '.join(f'{one.cost:.6f}' for one in optima)}")
     agreement(plan.problem, plan.peer.program(plan.problem, plan.problem.times, plan.options), found)
