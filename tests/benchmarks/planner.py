@@ -69,6 +69,7 @@ class Peer:
         self, problem: Problem, times: Array, guess: Array, options: GlobalOptions, keep_off: float = 0.0
     ) -> Optimum:
         """What `optimum.optimise` does by Drake's IPOPT."""
+        assert not keep_off, "the peer knows no obstacles"
         q, cost, statistics = self.program(problem, times, options).solve(guess)
         status = statistics["return_status"]
         return Optimum(q, cost, status in CONVERGED, status)
@@ -77,8 +78,8 @@ class Peer:
 class Plan:
     """One problem, its starts, and both sides' way from them to all optima."""
 
-    def __init__(self, name: str) -> None:
-        config = composed(f"+experiment={name}")
+    def __init__(self, name: str, *words: str) -> None:
+        config = composed(f"+experiment={name}", *words)
         self.problem, self.options = prepare(config), config.method.of("global")
         self.grids = planner.refinement(self.problem.times, self.options.coarse_steps or planner.STEPS)
         begin = time.process_time()
@@ -111,9 +112,9 @@ class Plan:
         return [good[index] for index in planner._distinct(good, self.options, self.problem)]
 
 
-def simulation(name: str) -> None:
-    """One line, and the optima of both."""
-    plan = Plan(name)
+def simulation(name: str, *words: str) -> None:
+    """One line, and the optima of both; `words` change the experiment."""
+    plan = Plan(name, *words)
     plan.theirs()  # the peer's functions are made
     milliseconds: dict[str, list[float]] = {"ours": [], "peer": []}
     found: dict[str, list[Optimum]] = {}

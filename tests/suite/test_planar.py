@@ -14,6 +14,7 @@ from tests.support import composed
 
 KNOWN = pd.read_csv(FILE, quotechar='"')
 SAME = 1e-4  # relative: costs of one optimum
+NEAR = 1.5  # times the best
 
 
 def found_of(name: str) -> tuple[list[float], list[float]]:
@@ -27,15 +28,14 @@ def found_of(name: str) -> tuple[list[float], list[float]]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", list(COUNTS))
-def test_the_best_is_found_and_nearly_all_others(kind: str) -> None:
-    names = [name for name in KNOWN["name"] if name.startswith(kind)]
-    assert len(names) == COUNTS[kind]
+def test_the_best_is_found_and_nearly_all_that_are_near_it() -> None:
     listed = total = 0
-    for name in names:
+    for name in KNOWN["name"]:
         known, ours = found_of(name)
         assert ours, name
         assert ours[0] <= known[0] * (1 + SAME), name
-        listed += sum(min(abs(cost / other - 1) for other in ours) < SAME for cost in known)
-        total += len(known)
+        near = [cost for cost in known if cost < NEAR * known[0]]
+        listed += sum(min(abs(cost / other - 1) for other in ours) < SAME for cost in near)
+        total += len(near)
+    assert len(KNOWN) == sum(COUNTS.values())
     assert listed >= 0.95 * total, f"{listed} of {total}"
