@@ -32,7 +32,7 @@ def test_small_programs(capsys: pytest.CaptureFixture[str]) -> None:
 @pytest.mark.parametrize("name", ["sim1", "sim5"])
 def test_the_planner_beside_its_peer(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     """sim1: energy, free; sim5: a cycle with limits."""
-    planner.simulation(name, *FEW_STARTS, "method.global.optimised=3", "timing.steps=24")
+    planner.simulation(name, *FEW_STARTS, "method.global.optimised=12", "timing.steps=24")
     out = capsys.readouterr().out
     assert all(number > 0 for number in line_of(name, out))
     costs = {label: float(cost) for label, cost in re.findall(r"^  (ours|peer) +(\S+)", out, re.M)}
