@@ -180,7 +180,8 @@ def _judge(
         worst = int(np.argmax(error))
         if error[worst] > solution.tracking_tolerance:
             return Status.UNCONFIRMED, (
-                f"the end effector is {error[worst]:.2e} {unit} off its path at t = {solution.trajectory.time[worst]:.2f} s; "
+                f"the end effector is {error[worst]:.2e} {unit} off its path at "
+                f"t = {solution.trajectory.time[worst]:.2f} s; "
                 f"{solution.method} promises {solution.tracking_tolerance:.0e} {unit}"
             )
     for kind in solution.limits_kept:

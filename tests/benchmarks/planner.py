@@ -1,7 +1,7 @@
 """The global planner's multi-start on the Global paper's simulations beside the same multi-start in CasADi + IPOPT.
 
 The peer gets the planner's own starts, grids, splines between grids, choice of basins and tolerances; only the solves
-differ. Timed are the solves: not imports, not the drawing of the starts, and not CasADi's construction of its functions.
+differ. Timed are the solves: not imports, not the drawing of the starts, not CasADi's construction of its functions.
 """
 
 from __future__ import annotations
