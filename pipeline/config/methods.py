@@ -71,7 +71,7 @@ class PmkeOptions:
 
 @schema
 class RecedingOptions:
-    """PMKE with limits: a receding horizon that keeps limits and obstacles, and whose knots are executed as they are."""
+    """PMKE with limits: a receding horizon that keeps limits and obstacles; its knots are executed as they are."""
 
     prediction_step: Annotated[Positive, Field(description="[s] spacing of the knots")] = 1.0
     horizon: Annotated[Whole, Field(ge=1, description="predicted knots")] = 2
@@ -90,7 +90,8 @@ class GlobalOptions:
     starts: Annotated[
         Literal["roadmap", "population", "dynamic_programming", "both"],
         Field(
-            description="where the solver starts from; population: as in the paper; dynamic_programming: r = 1; both: these"
+            description="where the solver starts from; population: as in the paper; dynamic_programming: r = 1; "
+            "both: these"
         ),
     ] = "roadmap"
     solver: Annotated[

@@ -89,7 +89,7 @@ class Evaluation:
         return float(self.integrals[name][-1])
 
     def to_frame(self) -> pd.DataFrame:
-        """A row per knot: time [s], q_1..n [rad or m], qd_1.., qdd_1.., tau_1.. [N m or N] and the end effector's x, y, z [m].
+        """A row per knot: time [s], q_1..n [rad or m], qd_1.., qdd_1.., tau_1.. [N m or N], the effector's x, y, z [m].
 
         Of a floating base also its position base_x, .. [m] and its rotation vector base_rx, .. [rad] in the world.
         """
@@ -197,7 +197,8 @@ def _judge(
         worst = int(np.argmax(error))
         if error[worst] > solution.tracking_tolerance:
             return Status.UNCONFIRMED, (
-                f"the end effector is {error[worst]:.2e} {unit} off its path at t = {solution.trajectory.time[worst]:.2f} s; "
+                f"the end effector is {error[worst]:.2e} {unit} off its path at "
+                f"t = {solution.trajectory.time[worst]:.2f} s; "
                 f"{solution.method} promises {solution.tracking_tolerance:.0e} {unit}"
             )
     for kind in solution.limits_kept:

@@ -59,7 +59,7 @@ class Solution:
     statistics: dict[str, Any] = field(default_factory=dict)
 
     def to_frame(self) -> pd.DataFrame:
-        """The motion as a table of N + 1 rows: time [s] and all coordinates q_1..n [rad or m], a moving base's first."""
+        """The motion as a table of N + 1 rows: time [s], all coordinates q_1..n [rad or m], a moving base's first."""
         q = self.trajectory.q
         return pd.DataFrame({"time": self.trajectory.time, **{f"q_{j + 1}": q[:, j] for j in range(q.shape[1])}})
 

@@ -1,8 +1,8 @@
 """Drake's IPOPT has the last word: it is started where Newton's method ended, on the program that it would have solved.
 
-Newton's iterates end on the central path with the barrier at 1e-10. IPOPT takes over there: its first multipliers mu / s
-are then the optimal ones, nothing is pushed away from its bounds, and it stops after 0 to 2 iterations. It must not scale
-the objective, or those multipliers are not the optimal ones any more.
+Newton's iterates end on the central path with the barrier at 1e-10. IPOPT takes over there: its first multipliers mu /
+s are then the optimal ones, nothing is pushed away from its bounds, and it stops after 0 to 2 iterations. It must not
+scale the objective, or those multipliers are not the optimal ones any more.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Cheapest paths through a layered graph (Bellman 1957): nodes (n_i,) in layers 0 .. L, edges (n_i, n_(i+1)) with costs."""
+"""Cheapest paths through a layered graph (Bellman 1957): nodes (n_i,) in layers 0 .. L, edge costs (n_i, n_(i+1))."""
 
 from __future__ import annotations
 

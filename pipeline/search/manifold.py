@@ -45,7 +45,7 @@ class Manifold:
         return np.asarray(q - self.period * np.ceil((q - np.pi) / (2 * np.pi)))
 
     def metric(self, q: Array) -> Array:
-        """G (K, n, n) of the objective's L = 1/2 qd'G qd (`lagrangian.py`); M where the objective is of second order."""
+        """G (K, n, n) of the objective's L = 1/2 qd'G qd (`lagrangian.py`); M if the objective is of second order."""
         mass = np.concatenate([mass_matrix(self.chain, q[k : k + BLOCK]) for k in range(0, len(q), BLOCK)])
         return np.asarray(self.inertia * mass + 2 * self.norm * np.eye(self.n))
 
@@ -70,7 +70,7 @@ class Manifold:
     def project(
         self, q: Array, target: Array, metric: Array | None = None, *, steps: int = 25, tolerance: float = ARRIVED
     ) -> tuple[Array, Array]:
-        """q (K, n) moved onto their targets by damped Newton steps of least length (in `metric`), and which arrived (K,)."""
+        """q (K, n) moved onto their targets by damped Newton steps of least length (`metric`), which arrived (K,)."""
         q, arrived = q.copy(), np.zeros(len(q), bool)
         rows = np.arange(len(q))  # those that are not there yet
         for step in range(steps + 1):

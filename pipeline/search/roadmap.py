@@ -1,9 +1,9 @@
-"""Starts for any redundancy: a layered graph of configurations on the self-motion manifolds of a few points of the path.
+"""Starts for any redundancy: a layered graph of configurations on the self-motion manifolds of some points of the path.
 
 Half of each layer's nodes are uniform joint angles put onto the manifold, which reach every branch; the other half are
 carried along the whole path from some layers by inertia-weighted steps, which stay on a branch. An edge costs
-1/2 d'G d/dt with the objective's metric G at both ends. The cheapest path through every node is a start; cheap ones that
-are far apart are priced on the first grid, and of those again the cheap ones that are far apart remain.
+1/2 d'G d/dt with the objective's metric G at both ends. The cheapest path through every node is a start; cheap ones
+that are far apart are priced on the first grid, and of those again the cheap ones that are far apart remain.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ class Roadmap:
 
 
 def edge_costs(manifold: Manifold, times: Array, nodes: list[Array], velocity: Array) -> Edges:
-    """Of every pair of neighbours 1/2 d'G d/dt, G the mean of both ends' metrics; infinite above the limits `velocity` (n,)."""
+    """Of every pair of neighbours 1/2 d'G d/dt, G the mean of both ends' metrics; infinite beyond `velocity` (n,)."""
     roots = [np.linalg.cholesky(manifold.metric(layer)) for layer in nodes]
     n, edges = manifold.n, []
     for i, dt in enumerate(np.diff(times)):
@@ -122,7 +122,7 @@ class _Sampler:
 
 
 def _on_grid(manifold: Manifold, times: Array, coarse: Array, grid: Array) -> Array:
-    """The motions (P, L + 1, n) between layers, put onto the path at the knots `grid`; those that lose it are left out."""
+    """The motions (P, L + 1, n) between layers, put onto the path at the knots `grid`; without those that lose it."""
     at = np.clip(np.searchsorted(times, grid, side="right") - 1, 0, len(times) - 2)
     share = ((grid - times[at]) / (times[at + 1] - times[at]))[:, None]
     q = np.clip(coarse[:, at] * (1 - share) + coarse[:, at + 1] * share, manifold.lower, manifold.upper)

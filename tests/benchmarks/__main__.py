@@ -67,7 +67,7 @@ def predictions(repeats: int = REPEATS) -> None:
 
 
 def fine_solve(repeats: int = REPEATS) -> None:
-    """The last stage of the global planner on trajectory 3: 101 points, 303 parameters, started from the stage before."""
+    """The last stage of the global planner on trajectory 3: 101 points, 303 parameters, from the stage before."""
     problem = prepare(check({}))
     options = GlobalOptions()
     coarse = refinement(problem.times, STEPS)[-2]

@@ -1,4 +1,4 @@
-"""Whole plans on the Global paper's simulations beside the same plans in CasADi + IPOPT with exact Hessians, interleaved.
+"""Whole plans on the Global paper's simulations beside those of CasADi + IPOPT with exact Hessians, interleaved.
 
 The peer gets the planner's own starts, grids, splines between grids, choice of basins and tolerances; only the solves
 differ: ours are batches of Newton's method with IPOPT's confirmation. Timed is processor time, not imports, not the

@@ -1,4 +1,4 @@
-"""The planner on the simulations of the Global paper, with fewer starts than the paper: numbers recomputed from q(t)."""
+"""The planner on the simulations of the Global paper, with fewer starts: numbers recomputed from q(t)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Every method on every kind of problem: it returns motions, or refuses with one line, alike from Python and a command."""
+"""Every method on every kind of problem: motions, or a refusal of one line, alike from Python and a command."""
 
 from __future__ import annotations
 

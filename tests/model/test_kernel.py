@@ -33,7 +33,8 @@ def with_sliding_joints(folder: Path) -> Arm:
         parts.append(
             f'<joint name="j{i}" type="{kind}"><parent link="l{i - 1}"/><child link="l{i}"/>'
             f'<origin xyz="0.1 0.0{i} 0.2" rpy="0.{i} -0.3 0.2"/><axis xyz="{axis}"/>{limit}</joint>'
-            f'<link name="l{i}"><inertial><origin xyz="0.0{i} 0.02 -0.03" rpy="0.1 0.2 0.{i}"/><mass value="{0.5 * i}"/>'
+            f'<link name="l{i}"><inertial><origin xyz="0.0{i} 0.02 -0.03" rpy="0.1 0.2 0.{i}"/>'
+            f'<mass value="{0.5 * i}"/>'
             '<inertia ixx="0.02" iyy="0.025" izz="0.03" ixy="0.002" ixz="-0.001" iyz="0.003"/></inertial></link>'
         )
     file = folder / "sliding.urdf"

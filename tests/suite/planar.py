@@ -2,8 +2,9 @@
 
     python -m tests.suite.planar
 
-which draws the problems from fixed seeds and searches each from 600 random motions: random configurations at one to three
-random knots, joined by straight lines of the joints and put back onto the path. None of that is the planner's way to start.
+which draws the problems from fixed seeds and searches each from 600 random motions: random configurations at one to
+three random knots, joined by straight lines of the joints and put back onto the path. None of that is the planner's way
+to start.
 """
 
 from __future__ import annotations

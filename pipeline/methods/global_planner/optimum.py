@@ -91,8 +91,9 @@ def go_on(context: tuple[Problem, Array, GlobalOptions], first: Optimum) -> Opti
 
 
 def _has_strayed(problem: Problem, times: Array, guess: Array, optimum: Optimum) -> bool:
-    """Whether a solve ended far above a guess that keeps every limit: its first steps led into a motion with jumps, which
-    coarse differences make an optimum of its own. A finer grid then starts from the guess. Accelerations must count for it.
+    """Whether a solve ended far above a guess that keeps every limit: its first steps led into a motion with jumps,
+    which coarse differences make an optimum of its own. A finer grid then starts from the guess. Accelerations must
+    count for it.
     """
     if not problem.objective.second_order:
         return False

@@ -1,7 +1,8 @@
 """The interpolation-based Global Kinematic Planner (Global paper Section 3): many coarse starts, every optimum refined.
 
-Initial configurations and a population of motions are drawn and ranked (`search/population.py`), the best diverse ones are
-optimised on a coarse grid, and each distinct optimum is carried to the wanted knots by cubic splines, halving the step.
+Initial configurations and a population of motions are drawn and ranked (`search/population.py`), the best diverse ones
+are optimised on a coarse grid, and each distinct optimum is carried to the wanted knots by cubic splines, halving the
+step.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """A serial arm in vectorised numpy: where its joints and its end effector are, for many knots in one call.
 
 Every number is read out of Drake's finalized plant: axes and places of the joints, and the inertia of what each of them
-carries rigidly. All is written in the world frame; a spatial vector is (angular, linear at the world's origin) (Featherstone
-2008, chapter 2). Knots lie on the LAST axis, so that each numpy operation is long and contiguous.
+carries rigidly. All is written in the world frame; a spatial vector is (angular, linear at the world's origin)
+(Featherstone 2008, chapter 2). Knots lie on the LAST axis, so that each numpy operation is long and contiguous.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ def cross(a: Array, b: Array) -> Array:
 
 @dataclass(frozen=True)
 class Places:
-    """Where the joints of a chain are: axes (n, 3, 3, K) with axes[j, c] the c-th column of joint frame j's rotation in the
-    world, origins (n, 3, K) [m], and the joints' screws: turning (n, 3, K), moving (n, 3, K) at the world's origin.
+    """Where the joints of a chain are: axes (n, 3, 3, K) with axes[j, c] the c-th column of joint frame j's rotation in
+    the world, origins (n, 3, K) [m], and the joints' screws: turning (n, 3, K), moving (n, 3, K) at the world's origin.
     """
 
     axes: Array
@@ -44,8 +44,9 @@ class Chain:
     """n joints in series. Joint frame j turns about or slides along its z axis; at q_j = 0 it has the orientation
     turn[j] (3, 3) and the place shift[j] (3,) [m] in frame j - 1 (the world for j = 0).
 
-    mass (n,) [kg], moment (n, 3) [kg m] and inertia (n, 3, 3) [kg m^2] about the joint frame's origin: of what moves rigidly
-    with it, in its frame. tip (3,) [m], tip_turn (3, 3): the end effector in the last frame. armature (n,); gravity (3,).
+    mass (n,) [kg], moment (n, 3) [kg m] and inertia (n, 3, 3) [kg m^2] about the joint frame's origin: of what moves
+    rigidly with it, in its frame. tip (3,) [m], tip_turn (3, 3): the end effector in the last frame. armature (n,);
+    gravity (3,).
     """
 
     turn: Array

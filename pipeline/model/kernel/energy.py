@@ -1,8 +1,8 @@
 """Kinetic energy of a chain, its gradient and its whole Hessian, exact, for many knots in one call.
 
-With S_i the screw of joint i, V_i = sum_(j<=i) S_j qd_j the velocity of its link, Sd_i = V_i x S_i its rate, and, summed over
-all links b from i on, Ic_i = sum I_b the inertia and H_i = sum I_b V_b the momentum; since dS_j/dq_i = S_i x S_j for
-i <= j (Featherstone 2008, chapter 2), and with
+With S_i the screw of joint i, V_i = sum_(j<=i) S_j qd_j the velocity of its link, Sd_i = V_i x S_i its rate, and,
+summed over all links b from i on, Ic_i = sum I_b the inertia and H_i = sum I_b V_b the momentum; since
+dS_j/dq_i = S_i x S_j for i <= j (Featherstone 2008, chapter 2), and with
 
     U_i = Ic_i S_i,      F_i = Ic_i Sd_i + S_i x* H_i,
 
@@ -28,7 +28,7 @@ def _none() -> Array:
 
 @dataclass(frozen=True)
 class Energy:
-    """T (K,) [J], by_q, by_qd (K, n); M, mixed P = d2T/dqd dq, by_q_q = d2T/dq dq (K, n, n), empty where not asked for."""
+    """T (K,) [J], by_q, by_qd (K, n); M, mixed P = d2T/dqd dq, by_q_q = d2T/dq dq (K, n, n), empty if not asked for."""
 
     value: Array
     by_q: Array

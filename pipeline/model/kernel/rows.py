@@ -1,8 +1,9 @@
 """The rows of a task on the kernel: error, Jacobian and second derivatives, for many knots in one call.
 
-For a point of the end effector an earlier joint i turns what a later joint j does: d2x/dq_i dq_j = w_i x J_j for i <= j.
-Orientation rows use own_i, joint i's angular velocity in the effector's frame. Of the rotation logarithm phi (whose first
-derivative is exact) and of the direction `seen` (the prescribed axis in the effector's frame), on the target:
+For a point of the end effector an earlier joint i turns what a later joint j does: d2x/dq_i dq_j = w_i x J_j for
+i <= j. Orientation rows use own_i, joint i's angular velocity in the effector's frame. Of the rotation logarithm phi
+(whose first derivative is exact) and of the direction `seen` (the prescribed axis in the effector's frame), on the
+target:
 
     d2phi/dq_i dq_j = 1/2 own_i x own_j,       d2seen/dq_i dq_j = own_j x (own_i x seen),       i <= j,
 
@@ -23,8 +24,8 @@ from pipeline.model.task import PoseTask, Task
 
 @dataclass(frozen=True)
 class Rows:
-    """error (K, m), jacobian (K, m, n), and the columns (K, n, 3) that second derivatives are made of: turning w_i, moving
-    J_i and, for poses, own_i.
+    """error (K, m), jacobian (K, m, n), and the columns (K, n, 3) that second derivatives are made of: turning w_i,
+    moving J_i and, for poses, own_i.
     """
 
     error: Array

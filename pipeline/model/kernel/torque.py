@@ -1,13 +1,13 @@
 """Inverse dynamics of a chain and its derivatives, exact, for many knots in one call.
 
 With spatial vectors in the world (Featherstone 2008, chapter 5): V_i = sum_(j<=i) S_j qd_j, Sd_j = V_j x S_j,
-A_i = -g + sum_(j<=i) (S_j qdd_j + Sd_j qd_j), f_i = sum_(b>=i) (I_b A_b + V_b x* I_b V_b), tau_i = S_i . f_i. Derivatives by
-Singh, Russo and Wensing (2022, "Efficient analytical derivatives of rigid-body dynamics using spatial vector algebra"): with
-B = 1/2 (V x* I - I V x + (I V) xb*), where (f xb*) v = v x* f, summed over all links from i on like I, and
-Sdd_j = A_(j-1) x S_j + V_(j-1) x Sd_j, for j <= i:
+A_i = -g + sum_(j<=i) (S_j qdd_j + Sd_j qd_j), f_i = sum_(b>=i) (I_b A_b + V_b x* I_b V_b), tau_i = S_i . f_i.
+Derivatives by Singh, Russo and Wensing (2022, "Efficient analytical derivatives of rigid-body dynamics using spatial
+vector algebra"): with B = 1/2 (V x* I - I V x + (I V) xb*), where (f xb*) v = v x* f, summed over all links from i on
+like I, and Sdd_j = A_(j-1) x S_j + V_(j-1) x Sd_j, for j <= i:
 
-    dtau_i/dq_j  = S_i . (2 B_i Sd_j + I_i Sdd_j),      dtau_j/dq_i  = S_j . (2 B_i Sd_i + I_i Sdd_i + S_i x* f_i),  j < i
-    dtau_i/dqd_j = S_i . 2 (B_i S_j + I_i Sd_j),        dtau_j/dqd_i = S_j . 2 (B_i S_i + I_i Sd_i).
+    dtau_i/dq_j  = S_i . (2 B_i Sd_j + I_i Sdd_j),    dtau_j/dq_i  = S_j . (2 B_i Sd_i + I_i Sdd_i + S_i x* f_i),  j < i
+    dtau_i/dqd_j = S_i . 2 (B_i S_j + I_i Sd_j),      dtau_j/dqd_i = S_j . 2 (B_i S_i + I_i Sd_i).
 """
 
 from __future__ import annotations

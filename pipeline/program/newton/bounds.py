@@ -10,7 +10,7 @@ from pipeline.program.newton.knots import Knots
 
 
 class Bounds:
-    """L rows: q_ij - lower_j, upper_j - q_ij at the unknown knots, and dt_i V_j -+ (q_ij - q_(i-1)j); finite ones only."""
+    """L rows: q_ij - lower_j, upper_j - q_ij at the unknown knots, and dt_i V_j -+ (q_ij - q_(i-1)j); if finite."""
 
     def __init__(self, knots: Knots, limits: Limits) -> None:
         self.knots, self.n = knots, len(limits.lower)

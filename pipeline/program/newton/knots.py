@@ -52,7 +52,7 @@ class Knots:
         return total
 
     def between(self, blocks: Array) -> Array:
-        """Blocks (S, U, ...) of owned intervals' two ends, as couplings of knots k and k + 1 (in a cycle the last and 0)."""
+        """Blocks (S, U, ...) of owned intervals' ends: couplings of knots k and k + 1 (in a cycle the last and 0)."""
         return np.roll(blocks, -1, axis=1) if self.cyclic else blocks[:, 1:]
 
     def product(self, diagonal: Array, off: Array, d: Array) -> Array:

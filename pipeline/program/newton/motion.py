@@ -1,6 +1,6 @@
 """Cost, path error and all their derivatives of many motions at once: what a Newton step is made of.
 
-    sum_i dt_i L(q_i, (q_i - q_(i-1)) / dt_i),   L = a T + c |qd|^2,   x(q_i) = x_ref,i      (`program.py`, `lagrangian.py`)
+    sum_i dt_i L(q_i, (q_i - q_(i-1)) / dt_i),   L = a T + c |qd|^2,   x(q_i) = x_ref,i  (`program.py`, `lagrangian.py`)
 
 With M, P, Q the second derivatives of L by (qd, qd), (qd, q), (q, q), interval i adds dt Q + P + P' + M/dt at its end,
 M/dt at its beginning, and -P - M/dt between the two.
@@ -44,8 +44,8 @@ def _each(value: Any, change: Any) -> Any:
 
 @dataclass
 class Point(PerStart):
-    """At unknowns x (S, U, n): cost (S,), gradient (S, U, n), Hessian blocks diagonal, off and those of the stiffness M/dt
-    alone, error (S, U, m); J' = Y R with null space Z; columns for the curvature of the path (`rows.py`).
+    """At unknowns x (S, U, n): cost (S,), gradient (S, U, n), Hessian blocks diagonal, off and those of the stiffness
+    M/dt alone, error (S, U, m); J' = Y R with null space Z; columns for the curvature of the path (`rows.py`).
     """
 
     cost: Array

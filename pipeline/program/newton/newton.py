@@ -3,14 +3,14 @@
 Each iteration serves all starts and all knots with one call of the kernel.
 
 1. exact gradient and block-tridiagonal Hessian (`motion.py`), plus the path's curvature by its multipliers;
-2. per knot J' = Y R and the null space Z: the step onto the path is -Y R^-T e, the multipliers are -R^-1 Y'g, and what is
-   left is Z'HZ, N r unknowns in a narrow band (Nocedal and Wright 2006, Section 18.3), solved by Cholesky. Where it is not
-   positive definite it fades into the stiffness M/dt, which always is;
-3. limits c >= 0 by a primal-dual interior point (Nocedal and Wright, chapter 19) with slacks s and, so that a start beyond
-   its limits is none the worse, an excess t that costs PENALTY each: c + t = s, z s = mu, (PENALTY - z) t = mu. All this
-   is diagonal: the band stays. Where an excess remains, no motion near the start keeps the limits;
-4. full steps are the rule; others are searched with the filter of Waechter and Biegler (2006), each trial bent back onto
-   the path (a second-order correction);
+2. per knot J' = Y R and the null space Z: the step onto the path is -Y R^-T e, the multipliers are -R^-1 Y'g, and what
+   is left is Z'HZ, N r unknowns in a narrow band (Nocedal and Wright 2006, Section 18.3), solved by Cholesky. Where it
+   is not positive definite it fades into the stiffness M/dt, which always is;
+3. limits c >= 0 by a primal-dual interior point (Nocedal and Wright, chapter 19) with slacks s and, so that a start
+   beyond its limits is none the worse, an excess t that costs PENALTY each: c + t = s, z s = mu, (PENALTY - z) t = mu.
+   All this is diagonal: the band stays. Where an excess remains, no motion near the start keeps the limits;
+4. full steps are the rule; others are searched with the filter of Waechter and Biegler (2006), each trial bent back
+   onto the path (a second-order correction);
 5. a start that has converged, or whose steps vanish, leaves the batch.
 """
 
@@ -94,8 +94,8 @@ class State(PerStart):
 
 @dataclass
 class Step(PerStart):
-    """A direction: d (S, U, n), changes of slack, excess and multipliers (S, L), the predicted decrease; and of the iterate
-    the merit phi with its slope, and what is missed of path and slacks, theta.
+    """A direction: d (S, U, n), changes of slack, excess and multipliers (S, L), the predicted decrease; and of the
+    iterate the merit phi with its slope, and what is missed of path and slacks, theta.
     """
 
     d: Array

@@ -17,8 +17,8 @@ FEWEST = 4  # intervals: a shorter cycle does not fold
 def why_not(problem: Problem) -> str | None:
     """What Newton's method does not serve in `problem`, for the log; None: it serves it whole.
 
-    Served are the kinetic energy and the velocity norm of an arm on a base that stands, on positions and poses, with any
-    boundary, within limits of positions and velocities.
+    Served are the kinetic energy and the velocity norm of an arm on a base that stands, on positions and poses, with
+    any boundary, within limits of positions and velocities.
     """
     objective, bounds = problem.objective, problem.bounds
     reasons = {

@@ -10,8 +10,8 @@ TINY = 1e-300
 
 
 def split(matrix: Array) -> tuple[Array, Array]:
-    """R (m, m, K) and the orthogonal Q (n, n, K) of matrix (n, m, K) = Q[:, :m] R, by Householder reflections (Golub and
-    Van Loan 2013, Section 5.2). The first m columns of Q span the rows' space, the others the null space.
+    """R (m, m, K) and the orthogonal Q (n, n, K) of matrix (n, m, K) = Q[:, :m] R, by Householder reflections (Golub
+    and Van Loan 2013, Section 5.2). The first m columns of Q span the rows' space, the others the null space.
     """
     n, m, count = matrix.shape
     R = matrix.copy()
