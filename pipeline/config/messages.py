@@ -134,7 +134,7 @@ def _noun(schema: Node, node: Node, unit: str) -> str:
 
 def _list(item: Node, node: Node, unit: str) -> str:
     if "enum" in item:
-        return f"a list of at least one of: {', '.join(item['enum'])}"
+        return f"a list of {'at least one' if node.get('minItems') else 'any'} of: {', '.join(item['enum'])}"
     word = {"number": "numbers", "integer": "whole numbers", "array": "lists", "string": "words"}
     size = f" {node['minItems']}" if node.get("minItems") and node.get("minItems") == node.get("maxItems") else ""
     return f"a list of{size} {word.get(str(item.get('type')), 'tables')}{_bounds(item)}{unit}"

@@ -52,7 +52,7 @@ class RobotConfig:
 
     name: Annotated[Text, Field(description="of the robot, in tables and figures")] = "planar3r"
     urdf: Annotated[
-        Text, Field(description="URDF or SDF file: absolute, relative, one of robots/, or package://package/file")
+        Text, Field(description="URDF, SDF or MJCF file: a path, one of robots/, or package://package/file")
     ] = "robots/planar3r.urdf"
     base: Annotated[Text | None, Field(description="first link of the chain; null: the root link")] = None
     end_effector: Annotated[Text, Field(description="last link of the chain")] = "tip"

@@ -10,6 +10,7 @@ import numpy as np
 
 from pipeline.common.errors import InputError
 from pipeline.common.workers import Workers
+from pipeline.problem.integrals import INTEGRALS
 from pipeline.problem.lagrangian import Lagrangian
 from pipeline.problem.problem import Boundary, Problem
 from pipeline.problem.solution import Progress, Solution, no_progress
@@ -40,11 +41,7 @@ class Serves:
     def why_not(self, problem: Problem) -> str | None:
         """The first condition that `problem` does not meet, and what is supported, without a full stop; None: served."""
         why = self._unmet(problem)
-        if why is not None:
-            return f"{why}; supported {self}"
-        if problem.boundary is Boundary.CYCLIC and not _is_closed(problem):
-            return "the boundary is cyclic, but the path does not end where it starts"
-        return None
+        return _contradiction(problem) if why is None else f"{why}; supported {self}"
 
     def _unmet(self, problem: Problem) -> str | None:
         task, boundary = problem.task, problem.boundary
@@ -82,9 +79,16 @@ class Serves:
         return "are " + "; ".join(parts) if parts else "is every problem"
 
 
-def _is_closed(problem: Problem) -> bool:
+def _contradiction(problem: Problem) -> str | None:
+    """What no method can serve, because the problem's own parts do not go together."""
+    kind = problem.task.arm.base.kind
+    for name in problem.objective.weights:
+        if INTEGRALS[name].base not in ("any", kind):
+            return f"the objective holds {name}, which needs a {INTEGRALS[name].base} base; this one is {kind}"
     start, end = problem.reference.position(np.array([0.0, problem.reference.duration]))
-    return float(np.linalg.norm(end - start)) <= CLOSED
+    if problem.boundary is Boundary.CYCLIC and float(np.linalg.norm(end - start)) > CLOSED:
+        return "the boundary is cyclic, but the path does not end where it starts"
+    return None
 
 
 ANY = Serves()

@@ -48,7 +48,7 @@ class Arm:
         root: str | None = None,
         locked: Mapping[str, float] | None = None,
     ) -> Arm:
-        """The chain from the link `root` (None: the file's root) to the link `end_effector` of a URDF or SDF file.
+        """The chain from the link `root` (None: the file's root) to the link `end_effector` of a robot file.
 
         locked: positions [rad or m] of joints that do not move. Raises RobotError.
         """

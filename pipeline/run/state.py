@@ -32,6 +32,4 @@ def state(config: RunConfig) -> Problem:
         if why:
             served = [m.name for m in METHODS.values() if not m.why_not(problem, config.method.of(m.name))]
             raise ConfigError(f"{why}; methods that serve this problem: {', '.join(served)}")
-    if problem.task.arm.base.count and config.closed_loop.run:
-        raise ConfigError("closed_loop.run: the controller is one for arms on a fixed base")
     return problem

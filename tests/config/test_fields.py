@@ -50,6 +50,7 @@ class Outer:
     law: Annotated[Literal["quintic", "linear"], Field(description="of motion")] = "quintic"
     axes: Words[Literal["x", "y"]] = ("x",)
     on: Switch = True
+    marks: tuple[Literal["p", "q"], ...] = ()
     label: Text = "a"
     point: Annotated[Numbers, Field(min_length=2, max_length=2, description="[m] a place")] = (0.0, 0.0)
     direction: Annotated[OneOrList[Number], Field(description="[deg] angle, or a vector")] = 0.0
@@ -108,6 +109,7 @@ FAULTS: list[tuple[dict[str, Any], list[str]]] = [
     ({"global_": {"gain": 1}}, ["global_: unknown key; did you mean global?"]),
     ({"paths": {"a": [{"kind": "line"}, {"kind": "line", "length": 0}]}}, ["paths.a[1].length = 0", "> 0 m (length)"]),
     ({"paths": {"a": {"kind": "line"}}}, ["paths.a = ", "a list of tables"]),
+    ({"marks": "p"}, ["marks = 'p'", "a list of any of: p, q"]),
     ({"free": []}, ["must be a number or null"]),
     ({"on": None}, ["on = null", "must be true or false"]),
     ({1: 2}, ["1: unknown key"]),

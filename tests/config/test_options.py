@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from pipeline.config.options import HIDDEN, chosen, options
+from pipeline.config.options import chosen, options
 from tests.support import ROOT
 
 GROUPS = [
@@ -22,7 +22,7 @@ def test_what_the_configuration_picks() -> None:
 def test_every_option_says_what_it_is(group: str) -> None:
     found = options(group)
     assert len(found) >= 2
-    assert not any(name.startswith(HIDDEN) for name in found)
+    assert not any(name.startswith("_") for name in found)
     for name, says in found.items():
         assert len(says) > 10, name
         assert not says.startswith(("@", "python"))

@@ -156,5 +156,5 @@ def test_what_it_does_not_serve_is_one_line() -> None:
         with pytest.raises(InputError, match=word):
             pontryagin(stated("case1", **other))
     problem = stated("case1")
-    with pytest.raises(InputError, match="torque"):
+    with pytest.raises(InputError, match="no velocity"):
         pontryagin(replace(problem, objective=replace(problem.objective, weights={})))

@@ -13,6 +13,7 @@ from pipeline.config.methods import GlobalOptions, ParetoOptions
 from pipeline.config.run import RunConfig
 from pipeline.methods.method import ANY, Context, Serves
 from pipeline.methods.registry import METHODS
+from pipeline.problem.objective import Objective
 from pipeline.problem.problem import Boundary
 from pipeline.problem.solution import Status
 from pipeline.run.solve import solve
@@ -152,6 +153,15 @@ def test_a_cycle_needs_a_closed_path() -> None:
     for name in SERVED["cyclic"]:
         with pytest.raises(InputError, match="the path does not end where it starts"):
             METHODS[name](open_path)
+
+
+@pytest.mark.parametrize(("integral", "base"), [("base_rotation", "floating"), ("reaction_torque", "held")])
+def test_an_integral_of_the_base_needs_that_base(integral: str, base: str) -> None:
+    problem = replace(prepare(asked("fixed", "lsv")), objective=Objective({integral: 1.0}))
+    line = f"the objective holds {integral}, which needs a {base} base; this one is fixed"
+    assert METHODS["global"].why_not(problem) == f"global: {line}"
+    front = ParetoOptions(objectives=("kinetic_energy", integral))
+    assert METHODS["pareto"].why_not(prepare(asked("fixed", "pareto")), front) == f"pareto: global: {line}"
 
 
 def test_what_serves_everything_says_so() -> None:
