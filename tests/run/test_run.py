@@ -29,6 +29,7 @@ from pipeline.methods.pmke.predictive import pmke
 from pipeline.problem.problem import Boundary, Problem
 from pipeline.problem.solution import Status
 from pipeline.run.solve import solve
+from tests.reports import leave_out_pictures
 from tests.run.test_main import ROOT, Answer, call, command
 from tests.support import FEW, FEW_STARTS, RUN_FILES
 
@@ -165,7 +166,7 @@ class TestTraj3:
 
 @functools.cache
 def solved(number: int, method: str) -> tuple[Problem, list[Evaluation]]:
-    config = configured(f"+experiment=traj{number}", f"methods=[{method}]", *FEW_STARTS)
+    config = configured(f"+experiment=traj{number}", f"methods=[{method}]", *FEW_STARTS, "method.lsv.dt=0.02")
     problem = prepare(config)
     solutions, seconds = solve(problem, config, Context())
     assert seconds[method] > 0
@@ -248,6 +249,7 @@ def test_a_motion_that_was_not_found_does_not_cost_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     """The arm standing still is no result: 0 J s in the tables would be the best of all."""
+    leave_out_pictures(monkeypatch)
     monkeypatch.chdir(tmp_path)
     words = ["+experiment=traj1", "methods=[global]", "timing.steps=13", "parallel.workers=1", *FEW_STARTS]
     call(monkeypatch, capfd, *words, "method.global.max_iterations=1", "hydra.run.dir=results")
