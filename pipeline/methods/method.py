@@ -103,6 +103,11 @@ class Context:
     progress: Progress = no_progress
 
 
+@dataclass(frozen=True)
+class NoOptions:
+    """Of a method that has none."""
+
+
 Solve = Callable[[Problem, Any, Context], list[Solution]]
 
 

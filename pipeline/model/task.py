@@ -139,12 +139,12 @@ class PoseTask:
     def error(self, q: Array, target: Array) -> Array:
         """[x(q) - x_ref; rotation from the target's orientation] (K, m) [m, rad]."""
         position, rotation = self.arm.pose(q)
-        return np.hstack([position - target[:, :3], self._turn(rotation, target)[0]])
+        return np.hstack([position - target[:, :3], self.turn(rotation, target)[0]])
 
     def error_and_jacobian(self, q: Array, target: Array) -> tuple[Array, Array]:
         """The error (K, m) and its derivative by q (K, m, n), which is J on the target."""
         position, rotation, both = self.arm.pose_and_jacobian(q)
-        turn, by_angular = self._turn(rotation, target)
+        turn, by_angular = self.turn(rotation, target)
         angular = by_angular @ rotation.swapaxes(1, 2) @ both[:, :3]
         return np.hstack([position - target[:, :3], turn]), np.concatenate([both[:, 3:], angular], axis=1)
 
@@ -191,7 +191,7 @@ class PoseTask:
     def _rows(self, rotation: Array, both: Array) -> Array:
         return np.concatenate([both[:, 3:], self.basis @ rotation.swapaxes(1, 2) @ both[:, :3]], axis=1)
 
-    def _turn(self, rotation: Array, target: Array) -> tuple[Array, Array]:
+    def turn(self, rotation: Array, target: Array) -> tuple[Array, Array]:
         """The orientation error (K, 3 or 2) [rad] and its derivative (K, 3 or 2, 3) by a turn in the effector's frame."""
         wanted = Rotation.from_rotvec(target[:, 3:]).as_matrix()
         if self.pointing is None:
