@@ -31,6 +31,7 @@ from pipeline.reproduce.table import COLUMNS, command, compare, counts, judge
 from pipeline.reproduce.verdict import verdict
 from pipeline.run import session
 from tests.reports import leave_out_pictures
+from tests.tasks import HUNG
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 WORDS = {"b": "better", "m": "misprint", "d": "differs"}
@@ -288,7 +289,7 @@ def test_pages_open_in_a_browser(pages: list[Path], tmp_path: Path) -> None:
     subprocess.run(
         [str(CHROMIUM), *(f"--{word}" for word in options + quiet), "--window-size=1250,3300", f"--screenshot={picture}", pages[1].as_uri()],
         check=True,
-        timeout=60,
+        timeout=HUNG,
         capture_output=True,
     )  # fmt: skip
     shown = np.asarray(Image.open(picture).convert("RGB")).astype(int)

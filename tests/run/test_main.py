@@ -26,6 +26,7 @@ from pipeline.run import main as __main__
 from pipeline.run import session
 from pipeline.run.main import CONF
 from tests.support import ROOT
+from tests.tasks import HUNG
 
 
 @dataclass(frozen=True)
@@ -67,7 +68,7 @@ def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFi
     return partial(call, monkeypatch, capfd)
 
 
-def command(*words: str, folder: Path, timeout: float = 120) -> Answer:
+def command(*words: str, folder: Path) -> Answer:
     """The command line as a process of its own, started in `folder`."""
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
     done = subprocess.run(
@@ -76,7 +77,7 @@ def command(*words: str, folder: Path, timeout: float = 120) -> Answer:
         env=environment,
         capture_output=True,
         text=True,
-        timeout=timeout,
+        timeout=HUNG,
         check=False,
     )
     return Answer(done.returncode, done.stdout, done.stderr)

@@ -149,7 +149,7 @@ class TestTraj3:
         assert {"prepare", "solve", "evaluate", "tables", "figures", "recording"} <= set(facts["stages_s"])
         assert all(seconds >= 0 for seconds in facts["stages_s"].values())
         assert set(facts["methods_s"]) == {"lsv", "pmke", "global"}
-        assert facts["stages_s"]["solve"] == pytest.approx(sum(facts["methods_s"].values()), rel=0.2)
+        assert 0 < sum(facts["methods_s"].values()) <= facts["stages_s"]["solve"] + 0.01
         assert facts["config"]["timing"]["steps"] == 100
         by_method = {solved["method"]: solved["statistics"] for solved in facts["solutions"] if solved["optimum"] == 1}
         predictions = by_method["pmke"]["predictions"]
