@@ -14,6 +14,7 @@ from hydra.core.global_hydra import GlobalHydra
 
 from pipeline.run import main, session
 from tests.support import ROOT
+from tests.tasks import HUNG
 
 
 @dataclass(frozen=True)
@@ -48,7 +49,7 @@ def call(
     return Answer(code, *(capfd.readouterr() if capfd is not None else ("", "")))
 
 
-def command(*words: str, folder: Path, timeout: float = 120) -> Answer:
+def command(*words: str, folder: Path) -> Answer:
     """The command line as a process of its own, started in `folder`."""
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
     done = subprocess.run(
@@ -57,7 +58,7 @@ def command(*words: str, folder: Path, timeout: float = 120) -> Answer:
         env=environment,
         capture_output=True,
         text=True,
-        timeout=timeout,
+        timeout=HUNG,
         check=False,
     )
     return Answer(done.returncode, done.stdout, done.stderr)

@@ -56,6 +56,7 @@ FEW = GlobalOptions(configurations=12, candidates=150, optimised=6)
 FEW_STARTS = tuple(f"method.global.{key}={getattr(FEW, key)}" for key in ("configurations", "candidates", "optimised"))
 
 
+@cache
 def composed(*overrides: str) -> config.RunConfig:
     """The checked configuration of a command line."""
     with initialize_config_dir(str(ROOT / "conf"), version_base="1.3"):

@@ -111,6 +111,7 @@ class TestPublished:
         assert peaks(motions[0].qd)[2] == pytest.approx(3.8, rel=1e-6)  # the velocity limit is active
         assert motions[0].torque_integral[-1] == pytest.approx(0.182, rel=5e-3)
 
+    @pytest.mark.slow
     def test_sim5(self, starts: tuple[str, ...]) -> None:
         problem, motions = solved("+experiment=sim5", *starts)
         assert_sound(problem, motions)
@@ -131,6 +132,7 @@ def test_sim3_is_better_than_printed() -> None:
     assert peaks(motions[0].tau)[0] > 0.401  # no torque limit here
 
 
+@pytest.mark.slow
 def test_sim4_is_better_than_printed() -> None:
     problem, motions = solved("+experiment=sim4", *FEW)
     assert_sound(problem, motions)
@@ -146,7 +148,7 @@ def test_more_limits_never_cost_less() -> None:
 
 
 def test_statistics_tell_how_the_optima_were_found() -> None:
-    _, motions = solved("+experiment=sim5", *FEW)
+    _, motions = solved("+experiment=sim2", *FEW)
     log = motions[0].solution.statistics
     assert log["grids"] == [12, 25, 50, 100]
     assert len(log["starts"]) <= 12

@@ -24,6 +24,7 @@ from pipeline.reproduce.table import compare, counts
 from pipeline.run import session
 from tests.reports import leave_out_pictures
 from tests.reproduce.printed import asked, runs_in
+from tests.tasks import HUNG
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 
@@ -77,7 +78,7 @@ def test_pages_open_in_a_browser(pages: list[Path], tmp_path: Path) -> None:
     subprocess.run(
         [str(CHROMIUM), *(f"--{word}" for word in words), pages[1].as_uri()],
         check=True,
-        timeout=60,
+        timeout=HUNG,
         capture_output=True,
     )
     shown = np.asarray(Image.open(picture).convert("RGB")).astype(int)

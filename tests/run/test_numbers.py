@@ -20,7 +20,7 @@ from tests.support import FEW_STARTS, composed
 
 @functools.cache
 def solved(number: int, method: str) -> tuple[Problem, list[Evaluation]]:
-    config = composed(f"+experiment=traj{number}", f"methods=[{method}]", *FEW_STARTS)
+    config = composed(f"+experiment=traj{number}", f"methods=[{method}]", *FEW_STARTS, "method.lsv.dt=0.02")
     problem = prepare(config)
     solutions, seconds = solve(problem, config, Context())
     assert seconds[method] > 0

@@ -24,7 +24,7 @@ from tests.tasks import kept
 Sweep = Callable[..., Answer]
 LSV = (
     *("-m", "name=traj1", "methods=[lsv]", "timing.steps=10", "method.lsv.dt=0.05", "path=line"),
-    "hydra.sweep.dir=all",
+    *("export.method=none", "hydra.sweep.dir=all"),
 )
 
 

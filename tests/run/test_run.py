@@ -14,6 +14,7 @@ from pipeline.artifacts.recording.blueprint import slug
 from pipeline.artifacts.recording.recording import read_series
 from pipeline.build.problem import prepare
 from tests.commands import Answer, call, command
+from tests.reports import leave_out_pictures
 from tests.support import FEW_STARTS, RUN_FILES, composed
 
 FIGURES = ("stroboscopic", "joints", "energy", "torques")
@@ -123,7 +124,7 @@ class TestTraj3:
         assert {"prepare", "solve", "evaluate", "tables", "figures", "recording"} <= set(facts["stages_s"])
         assert all(seconds >= 0 for seconds in facts["stages_s"].values())
         assert set(facts["methods_s"]) == {"lsv", "pmke", "global"}
-        assert facts["stages_s"]["solve"] == pytest.approx(sum(facts["methods_s"].values()), rel=0.2)
+        assert 0 < sum(facts["methods_s"].values()) <= facts["stages_s"]["solve"] + 0.01
         assert facts["config"]["timing"]["steps"] == 100
         by_method = {solved["method"]: solved["statistics"] for solved in facts["solutions"] if solved["optimum"] == 1}
         predictions = by_method["pmke"]["predictions"]
@@ -165,6 +166,7 @@ def test_a_motion_that_was_not_found_does_not_cost_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     """The arm standing still is no result: 0 J s in the tables would be the best of all."""
+    leave_out_pictures(monkeypatch)
     monkeypatch.chdir(tmp_path)
     words = ["+experiment=traj1", "methods=[global]", "timing.steps=13", "parallel.workers=1", *FEW_STARTS]
     call(monkeypatch, capfd, *words, "method.global.max_iterations=1", "hydra.run.dir=results")
