@@ -134,7 +134,7 @@ def test_starts_by_dynamic_programming_serve_what_it_serves(starts: str) -> None
         line = METHODS["global"].why_not(prepare(asked(problem, "global")), options)
         assert line is not None
         assert line.startswith(f"global: method.global.starts = {starts}: dynamic_programming: ")
-        assert line.endswith("; starts = population serves every problem")
+        assert line.endswith("; starts = roadmap serves every problem")
 
 
 def test_a_front_is_refused_where_the_planner_is_or_two_integrals_are_not_given() -> None:
