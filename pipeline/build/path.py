@@ -99,7 +99,8 @@ def _orientation(path: PathConfig, task: Task, geometry: Geometry, here: Array) 
     if isinstance(task, PositionTask):
         if given:
             raise ConfigError(
-                "path.orientation, path.turn: the task prescribes no orientation; set robot.orientation to full or pointing"
+                "path.orientation, path.turn: the task prescribes no orientation; "
+                "set robot.orientation to full or pointing"
             )
         return None
     if isinstance(path, WaypointsConfig) and isinstance(geometry, Spline):

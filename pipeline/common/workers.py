@@ -41,7 +41,7 @@ LOOK_EVERY = 0.5  # [s], at its parent: a worker
 
 @dataclass(frozen=True)
 class Workers:
-    """How work is spread: `count` processes here (None: all cores), or the Dask cluster whose scheduler is at `address`.
+    """How work is spread: `count` processes here (None: all cores), or the Dask cluster of the scheduler at `address`.
 
     Finished results are kept in the folder `store` if given.
     """

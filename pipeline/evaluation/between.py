@@ -25,8 +25,8 @@ BETWEEN = 10  # sub-intervals per knot interval on which the motion between knot
 def between_knots(
     problem: Problem, plant: SinglePlant, clearance: Clearance, trajectory: Trajectory, qd_start: Array
 ) -> tuple[float, float, float, float, float, dict[str, float]]:
-    """The cubic spline through the knots: kinetic-energy integral (Simpson), objective, largest tracking and orientation
-    errors, smallest clearance, excess of limits.
+    """The cubic spline through the knots: kinetic-energy integral (Simpson), objective, largest tracking and
+    orientation errors, smallest clearance, excess of limits.
     """
     if not np.all(np.isfinite(trajectory.q)) or len(trajectory.time) < 4:
         return float("nan"), float("nan"), float("nan"), float("nan"), float("nan"), {}
@@ -64,7 +64,7 @@ def between_knots(
 
 @dataclass(frozen=True)
 class Audit:
-    """What samples of a motion keep: errors [m, rad], excess of limits and, by kind, the sample and joint of the worst."""
+    """What samples of a motion keep: errors [m, rad], excess of limits and, by kind, sample and joint of the worst."""
 
     tracking_error: float
     orientation_error: float

@@ -27,7 +27,7 @@ def read_waypoints(file: str | File, axes: Sequence[str]) -> Array:
 
 
 def read_orientations(file: str | File) -> Rotation | None:
-    """The orientations of the same rows: columns roll, pitch, yaw [rad] or qx, qy, qz, qw; None if there are neither."""
+    """The orientations of the same rows: columns roll, pitch, yaw [rad] or qx, qy, qz, qw; None if there are none."""
     header = _table(File(file)).columns
     if set(ROLL_PITCH_YAW) <= set(header):
         return Rotation.from_euler("xyz", _columns(File(file), ROLL_PITCH_YAW))
@@ -57,7 +57,8 @@ def _columns(file: File, names: Sequence[str]) -> Array:
     missing = [name for name in names if name not in table.columns]
     if missing:
         raise PathError(
-            f"path.file = {file}: no column {', '.join(missing)}; the header is {', '.join(map(str, table.columns))}, needed are {', '.join(names)}"
+            f"path.file = {file}: no column {', '.join(missing)}; the header is {', '.join(map(str, table.columns))}, "
+            f"needed are {', '.join(names)}"
         )
     values = table[list(names)].apply(pd.to_numeric, errors="coerce").to_numpy(dtype=float)
     bad = np.flatnonzero(~np.isfinite(values).all(axis=1))

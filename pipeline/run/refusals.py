@@ -25,7 +25,7 @@ GROUP = r"\+?[a-z_/]+=[\w,]+"  # a word that may pick an option
 
 
 def refuse(words: Sequence[str]) -> None:
-    """Raise ConfigError for what Hydra takes without a word: a deleted option, or one only there to be inherited from."""
+    """Raise ConfigError for what Hydra takes silently: a deleted option, or one only there to be inherited from."""
     parser = get_args_parser()
     parser.error = _unreadable  # type: ignore[method-assign]
     parser.parse_args(words)
