@@ -47,7 +47,9 @@ def check(address: str) -> None:
         print(f"{address} has no workers yet; waiting for the first", flush=True)
 
 
-def run(address: str, function: Any, context: Any, items: Sequence[Any]) -> Generator[tuple[int, bytes], None, None]:
+def run(
+    address: str, wait: float, function: Any, context: Any, items: Sequence[Any]
+) -> Generator[tuple[int, bytes], None, None]:
     """(index, function(context, item) as `kept` writes it) for all items, in the order in which they finish."""
     check(address)
     from distributed import Client, as_completed
@@ -55,6 +57,12 @@ def run(address: str, function: Any, context: Any, items: Sequence[Any]) -> Gene
 
     logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # what goes wrong is raised below
     with Client(address, timeout=TIMEOUT, set_as_default=False) as client:
+        try:
+            client.wait_for_workers(1, timeout=wait)
+        except TimeoutError:
+            raise ConfigError(
+                f"parallel.address = {address}: no worker came within parallel.wait = {wait:g} s"
+            ) from None
         tasks = [pickle.dumps((function, context, item)) for item in items]
         futures = client.map(_task, tasks, versions=stamp(), pure=False)
         indices = {future.key: index for index, future in enumerate(futures)}

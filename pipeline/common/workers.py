@@ -49,6 +49,7 @@ class Workers:
     count: int | None = 1
     store: Path | None = None
     address: str | None = None
+    wait: float = 60.0  # [s] for the first worker of the cluster
 
     def check(self) -> None:
         """Raise ConfigError if there is no cluster where one should be."""
@@ -79,7 +80,7 @@ class Workers:
 
     def _run(self, function: Any, context: Any, work: list[tuple[Path | None, Any]]) -> Generator[Any, None, None]:
         if self.address is not None and work:
-            return _on_cluster(self.address, function, context, work)
+            return _on_cluster((self.address, self.wait), function, context, work)
         return _here(min(self._count(), len(work)), function, context, work)
 
     def _count(self) -> int:
@@ -136,27 +137,32 @@ def _follow(parent: int) -> None:
 
 def _one(function: Any, context: Any, item: Any, file: Path | None) -> Any:
     result = function(context, item)
-    if file is not None:
+    if file is not None and _is_final(result):
         _keep(file, kept.dumps(result))
     return result
 
 
+def _is_final(result: Any) -> bool:
+    """Whether it would come out the same again; one that a clock has stopped says that it would not."""
+    return getattr(result, "final", True)
+
+
 def _on_cluster(
-    address: str, function: Any, context: Any, work: list[tuple[Path | None, Any]]
+    there: tuple[str, float], function: Any, context: Any, work: list[tuple[Path | None, Any]]
 ) -> Generator[Any, None, None]:
     """Results are kept here, as they finish: a cluster need not share our files."""
     from pipeline.common import cluster
 
-    waiting: dict[int, bytes] = {}
+    waiting: dict[int, Any] = {}
     following = 0
-    with closing(cluster.run(address, function, context, [item for _, item in work])) as finished:
+    with closing(cluster.run(*there, function, context, [item for _, item in work])) as finished:
         for index, content in finished:
-            file = work[index][0]
-            if file is not None:
+            file, result = work[index][0], kept.loads(content)
+            if file is not None and _is_final(result):
                 _keep(file, content)
-            waiting[index] = content
+            waiting[index] = result
             while following in waiting:
-                yield kept.loads(waiting.pop(following))
+                yield waiting.pop(following)
                 following += 1
 
 
