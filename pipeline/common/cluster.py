@@ -1,7 +1,7 @@
 """Work on a running Dask cluster. Its workers need this project in the same versions, but not our files.
 
-A task carries everything it needs, so that the cluster can repeat it elsewhere when a worker is lost. It is a pickle: who
-may reach the scheduler may run code on its workers, as with every Dask cluster. Results come back as plain numbers.
+A task carries everything it needs, so that the cluster can repeat it elsewhere when a worker is lost. It is a pickle:
+who reaches the scheduler may run code on its workers, as with every Dask cluster. Results come back as plain numbers.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Finished results as bytes that hold numbers and words, never code: who reads them need not trust who wrote them.
 
-An .npz archive of the arrays, read with allow_pickle=False, and a JSON document of everything else. A dataclass is named
-by its module; only one of this package that is loaded already can come back. A digest of it all stands behind.
+An .npz archive of the arrays, read with allow_pickle=False, and a JSON document of everything else. A dataclass is
+named by its module; only one of this package that is loaded already can come back. A digest of it all stands behind.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _DIGEST = hashlib.sha256().digest_size
 
 
 def dumps(value: Any) -> bytes:
-    """A value made of None, booleans, numbers, text, arrays, lists, tuples, dictionaries and the package's dataclasses."""
+    """A value made of None, booleans, numbers, text, arrays, lists, tuples, tables and the package's dataclasses."""
     arrays: list[Any] = []
     document = json.dumps(_plain(value, arrays)).encode()
     file = io.BytesIO()

@@ -1,8 +1,8 @@
 """One map over workers, with progress and resume. It knows nothing of what it maps.
 
 Results come back in the order of the items, whatever the workers: processes here, or those of a running Dask cluster.
-With a `store`, every finished result is kept under a key made from the function, the shared context, the item, our source
-and the versions in use, so that a killed run goes on where it was and never picks up work that belongs to other inputs.
+With a `store`, every finished result is kept under a key made from the function, the shared context, the item, our
+source and the versions in use, so that a killed run goes on where it was and never takes work that belongs to other inputs.
 """
 
 from __future__ import annotations
@@ -111,8 +111,8 @@ def _here(count: int, function: Any, context: Any, work: list[tuple[Path | None,
         except BrokenProcessPool:
             if restarted:
                 raise WorkerError(
-                    f"parallel.workers = {count}: worker processes were killed twice, by the system for want of memory or "
-                    "from outside; fewer of them, or fewer knots and starts, need less"
+                    f"parallel.workers = {count}: worker processes were killed twice, by the system for want of "
+                    "memory or from outside; fewer of them, or fewer knots and starts, need less"
                 ) from None
             restarted = True
 

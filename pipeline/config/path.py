@@ -13,6 +13,7 @@ START = "[m] task coordinates of the start; null: the end effector at robot.q_in
 
 
 Turn = Annotated[Number, Field(ge=-1000, le=1000)]  # [rad]: a hundred and fifty times round
+Turns = Annotated[tuple[Turn, ...], Field(min_length=3, max_length=3)]
 
 
 def _finer(row: tuple[float, ...]) -> tuple[float, ...]:

@@ -1,4 +1,4 @@
-"""How many steps a run would take where a step [s] or a rate [Hz] meets the duration: bounded, before anything begins."""
+"""How many steps a run would take where a step [s] or a rate [Hz] meets the duration: bounded, before any begins."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ def refuse_endless(config: RunConfig) -> None:
     for key, value, count, most in _counts(config):
         if count > most:
             raise ConfigError(
-                f"{key} = {value:g}: {count:.3g} steps in timing.duration = {duration:g} s; at most {most}, each of which "
-                "is evaluated and written"
+                f"{key} = {value:g}: {count:.3g} steps in timing.duration = {duration:g} s; at most {most}, each of "
+                "which is evaluated and written"
             )
 
 

@@ -15,7 +15,7 @@ from pipeline.common.arrays import Array
 logging.getLogger("drake").setLevel(logging.ERROR)
 
 
-STOPPED = "stopped"  # by the clock: another machine, or another day, would have come farther
+STOPPED = "stopped at max_time"  # by the clock: another machine, or another day, would have come farther
 CONVERGED = ("success", "stop at acceptable point")
 
 
@@ -38,7 +38,7 @@ def solve(
     max_time: float | None = None,
     extra: dict[str, Any] | None = None,
 ) -> Outcome:
-    """Run IPOPT from `guess`; never raises for a solver failure. No clock decides a result, unless max_time [s] is given.
+    """Run IPOPT from `guess`; never raises for a solver failure. No clock decides unless max_time [s] is given.
 
     The SPRAL settings halve the time of a whole solve on these banded problems (the defaults order and scale for much
     larger ones); bounds are not relaxed, so that a reported motion meets its limits to the digit.

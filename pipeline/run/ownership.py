@@ -1,6 +1,6 @@
 """A result folder has one owner: while a run writes into it, a file `.lock` there names its process and host.
 
-The file is locked by the operating system too, which lets go of it however a process ends: a lock that can be had is stale.
+The file is locked by the operating system too, which lets go of it however a process ends: what can be had is stale.
 """
 
 from __future__ import annotations

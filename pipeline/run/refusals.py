@@ -79,7 +79,7 @@ def in_one_line(error: Exception) -> str:
 
 
 def _quoted(word: str | None) -> str:
-    """The line for a value that Hydra reads in quotes only, such as a path with an umlaut; empty if they do not help."""
+    """The line for a value that Hydra reads in quotes only, as a path with an umlaut; empty if they do not help."""
     key, sign, value = (word or "").partition("=")
     inner = value.replace("\\", "\\\\").replace('"', '\\"')
     better = f'{key}="{inner}"'

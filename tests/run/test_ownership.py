@@ -15,12 +15,19 @@ import pytest
 
 from pipeline.common.errors import OutputError
 from pipeline.run import ownership
+from tests.commands import Run, assert_refused, call
 from tests.reports import leave_out_pictures
-from tests.run.test_main import Run, assert_refused, call
 from tests.support import ROOT
 
 LSV = ("methods=[lsv]", "timing.steps=10", "method.lsv.dt=0.05")
-HOLD = "import sys; from pipeline.run import ownership; ownership.own(__import__('pathlib').Path(sys.argv[1])); print('held', flush=True); input()"
+HOLD = """
+import sys
+from pathlib import Path
+from pipeline.run import ownership
+ownership.own(Path(sys.argv[1]))
+print("held", flush=True)
+input()
+"""
 
 
 @pytest.fixture

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import rerun as rr
@@ -10,6 +11,7 @@ import rerun.blueprint as rrb
 
 from pipeline.artifacts.recording.arm import columns, draw_arm
 from pipeline.artifacts.recording.blueprint import BACKGROUND, GRID, pixels
+from pipeline.artifacts.recording.stream import record
 from pipeline.common.arrays import Array
 from pipeline.model.arm import Arm
 from pipeline.studies import style
@@ -19,8 +21,6 @@ COLOR = (70, 120, 170, 255)
 
 def write(file: Path, arm: Arm, time: Array, q: Array, *, name: str) -> None:
     """Write `file` (.rrd), or raise and leave nothing behind. time (K,) [s], q (K, n)."""
-    file.parent.mkdir(parents=True, exist_ok=True)
-    temporary = file.with_name(f"{file.name}.tmp")
     tip = arm.position(q)
     around = np.vstack([tip, arm.mounting.base_position])
     center = (around.min(axis=0) + around.max(axis=0)) / 2
