@@ -2,7 +2,7 @@
 
 Results come back in the order of the items, whatever the workers: processes here, or those of a running Dask cluster.
 With a `store`, every finished result is kept under a key made from the function, the shared context, the item, our
-source and the versions in use, so that a killed run goes on where it was and never takes work that belongs to other inputs.
+source and the versions in use: a killed run goes on where it was and never takes work that belongs to other inputs.
 """
 
 from __future__ import annotations
