@@ -7,7 +7,7 @@ import tempfile
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from tests.commands import call
@@ -76,7 +76,7 @@ VALUES = st.one_of(
 )
 NUMBERS = st.one_of(
     st.floats(-0.3, 0.3).map(str),
-    st.sampled_from(["", "nan", "inf", "1_0", "0x1", "１", "1e999", "a", '"', "#", " 0.1 "]),
+    st.sampled_from(["", "nan", "inf", "1_0", "0x1", "\uff11", "1e999", "a", '"', "#", " 0.1 "]),
 )
 TABLES = st.one_of(
     st.text(max_size=60),
@@ -127,20 +127,20 @@ def answers(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], 
     return check
 
 
-@settings(max_examples=24, suppress_health_check=list(__import__("hypothesis").HealthCheck))
+@settings(max_examples=24, suppress_health_check=list(HealthCheck))
 @given(words=st.lists(st.tuples(st.sampled_from(KEYS), VALUES).map("=".join), min_size=1, max_size=2))
 def test_overrides(answers, words: list[str]) -> None:  # type: ignore[no-untyped-def]
     answers(*QUICK, *words)
 
 
-@settings(max_examples=12, suppress_health_check=list(__import__("hypothesis").HealthCheck))
+@settings(max_examples=12, suppress_health_check=list(HealthCheck))
 @given(table=TABLES)
 def test_way_points(answers, table: str) -> None:  # type: ignore[no-untyped-def]
     words = [word for word in QUICK if not word.startswith("path.")]
     answers(*words, "path=waypoints", "path.file=w.csv", "path.relative=true", file=("w.csv", table))
 
 
-@settings(max_examples=12, suppress_health_check=list(__import__("hypothesis").HealthCheck))
+@settings(max_examples=12, suppress_health_check=list(HealthCheck))
 @given(text=descriptions())
 def test_robot_descriptions(answers, text: str) -> None:  # type: ignore[no-untyped-def]
     answers(*QUICK, "robot.urdf=arm.urdf", "robot.end_effector=tip", file=("arm.urdf", text))
