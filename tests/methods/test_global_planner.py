@@ -208,7 +208,8 @@ def test_what_cannot_be_met_is_named(limit: str, unit: str) -> None:
     assert not only.confirmed
     assert "\n" not in only.message
     for part in (
-        "no feasible motion",
+        "none of 3 starts led to one",
+        "try more starts",
         f"the {kind} limit of joint",
         f"({float(value):.4g} {unit})",
         "least violation",
