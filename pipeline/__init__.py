@@ -25,7 +25,7 @@ _PUBLIC = {
     "PoseTask": "pipeline.model.task",
     "Line": "pipeline.path.curves",
     "Arc": "pipeline.path.curves",
-    "Spline": "pipeline.path.curves",
+    "Spline": "pipeline.path.spline",
     "circle": "pipeline.path.curves",
     "direction_vector": "pipeline.path.curves",
     "read_waypoints": "pipeline.path.waypoints",

@@ -14,6 +14,7 @@ from pipeline.common.arrays import Array
 from pipeline.evaluation.base import BaseMotion, angle_between, base_motion, entered_cycle
 from pipeline.evaluation.between import between_knots
 from pipeline.evaluation.clearance import Clearance
+from pipeline.evaluation.curve import OffPath, off_path, steps_needed, turns_of_cycle
 from pipeline.evaluation.limits import LIMITS, limit_excess
 from pipeline.evaluation.plant import SinglePlant
 from pipeline.evaluation.sums import differences, running_integral, weighted_sum
@@ -50,7 +51,7 @@ class Evaluation:
     singular_value: Array  # (N + 1,) smallest of the task Jacobian
     spectral_radius: Array  # (N + 1,) of M
     energy_integral_spline: float  # of the cubic spline through the knots, independent of the grid's quadrature
-    tracking_error_between: float  # largest between knots, along that spline
+    tracking_error_between: float  # largest along the curve that is exported, between knots too
     orientation_error_between: float
     clearance: Array  # (N + 1,) [m] smallest distance of a moving link from an obstacle; infinite without obstacles
     clearance_between: float  # smallest along that spline
@@ -122,9 +123,10 @@ def evaluate(problem: Problem, solution: Solution) -> Evaluation:
     clearance = distances(q)
     turn = angle_between(plant.start, way)
     excess = limit_excess(problem, q, qd, tau, float(clearance.min()), float(turn.max()))
-    spline_integral, spline_objective, between, turned_between, clear_between, excess_between = between_knots(
+    spline_integral, spline_objective, clear_between, excess_between = between_knots(
         problem, plant, distances, trajectory, qd[0]
     )
+    off = off_path(problem, plant, time, q)
     secondary = np.array([plant.secondary(problem, qi) for qi in q]) if problem.objective.secondary else np.zeros(count)
     moving = q
     q, qd, qdd, tau = (values[:, arm.joints] for values in (q, qd, qdd, tau))
@@ -135,6 +137,8 @@ def evaluate(problem: Problem, solution: Solution) -> Evaluation:
     status, message = solution.status, solution.message
     if status is Status.SOLVED:
         status, message = _judge(moving, tracking, turned, excess, solution)
+    if status is Status.SOLVED:
+        status, message = _judge_between(problem, off, solution, message)
     return Evaluation(
         solution=solution,
         status=status,
@@ -161,8 +165,8 @@ def evaluate(problem: Problem, solution: Solution) -> Evaluation:
         singular_value=singular,
         spectral_radius=radius,
         energy_integral_spline=spline_integral,
-        tracking_error_between=between,
-        orientation_error_between=turned_between,
+        tracking_error_between=off.distance,
+        orientation_error_between=off.angle,
         clearance=clearance,
         clearance_between=clear_between,
         limit_excess=excess,
@@ -187,3 +191,33 @@ def _judge(
         if excess.get(kind, 0.0) > LIMITS:
             return Status.UNCONFIRMED, f"a {kind} limit is exceeded by {100 * excess[kind]:.2g} %"
     return Status.SOLVED, solution.message
+
+
+def _judge_between(problem: Problem, off: OffPath, solution: Solution, message: str) -> tuple[Status, str]:
+    """The curve that is exported, against the tolerances of the path; and what there is to say of a cycle that winds."""
+    reference, time, arm = problem.reference, solution.trajectory.time, problem.task.arm
+    for error, allowed, unit, key, at in (
+        (off.distance, reference.tolerance, "m", "tolerance", off.at[0]),
+        (off.angle, reference.orientation_tolerance, "rad", "orientation_tolerance", off.at[1]),
+    ):
+        if error > allowed:
+            return Status.UNCONFIRMED, (
+                f"between its knots the motion is up to {error:.2g} {unit} off its path (at t = {at:.3g} s), more than "
+                f"path.{key} = {allowed:g} {unit}; {_advice(problem, time, error, allowed)}"
+            )
+    turns = turns_of_cycle(problem, solution.trajectory.q[:, arm.joints]) if problem.boundary is Boundary.CYCLIC else None
+    if turns is not None and np.any(turns):
+        names = arm.description.joints[arm.base.count :]
+        wound = [f"{name} {turn / (2 * np.pi):+.0f}" for name, turn in zip(names, turns, strict=True) if turn]
+        message = "; ".join(filter(None, [message, f"the cycle closes up to full turns: {', '.join(wound)}"]))
+    return Status.SOLVED, message
+
+
+def _advice(problem: Problem, time: Array, error: float, allowed: float) -> str:
+    """Which grid would do: that of the problem, or where a method has its own, its step."""
+    needed = steps_needed(problem, time, error, allowed)
+    if needed is None:
+        return "no finer grid helps: the motion does not follow the path between its knots"
+    if len(time) == len(problem.times):
+        return f"timing.steps = {needed} would do"
+    return f"a step of {problem.reference.duration / needed:.2g} s would do in place of {np.diff(time).max():.2g} s"
