@@ -75,7 +75,9 @@ def make_reference(path: Any, timing: TimingConfig, task: Task, q_init: Array) -
         law, notes = _law(path, timing, found, rows.times), _notes(path, found)
     else:
         if timing.law == "from_file":
-            raise ConfigError(f"timing.law = from_file: the times are those of a file; path.kind = {path.kind} has none")
+            raise ConfigError(
+                f"timing.law = from_file: the times are those of a file; path.kind = {path.kind} has none"
+            )
         geometry, orientation, notes = _curve(path, task, here[:count]), None, ()
         law = TIMINGS[timing.law](timing.duration)
     if orientation is None and not isinstance(task, PositionTask):

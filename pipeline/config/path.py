@@ -30,9 +30,9 @@ class PathConfig:
         0.0,
         0.0,
     )
-    tolerance: Annotated[
-        Number, Field(gt=0, description="[m] how far from it a motion may be between its knots")
-    ] = 1e-4
+    tolerance: Annotated[Number, Field(gt=0, description="[m] how far from it a motion may be between its knots")] = (
+        1e-4
+    )
     orientation_tolerance: Annotated[
         Number, Field(gt=0, description="[rad] the same of the orientation, where one is prescribed")
     ] = 1e-3
@@ -68,10 +68,13 @@ class WaypointsConfig(PathConfig):
     """`path=waypoints`: a smooth curve through the rows of a CSV file."""
 
     kind: Literal["waypoints"] = "waypoints"
-    file: Annotated[Text, Field(description="CSV file with header x,y or x,y,z, in m; orientations and times beside")] = ""
+    file: Annotated[
+        Text, Field(description="CSV file with header x,y or x,y,z, in m; orientations and times beside")
+    ] = ""
     relative: Annotated[Switch, Field(description="shift the curve so that it starts at the end effector")] = False
     corners: Annotated[
-        Literal["smooth", "rest"], Field(description="rest: straight from one way-point to the next, with a stop at each")
+        Literal["smooth", "rest"],
+        Field(description="rest: straight from one way-point to the next, with a stop at each"),
     ] = "smooth"
 
 

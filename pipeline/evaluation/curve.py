@@ -16,7 +16,8 @@ from pipeline.problem.turns import full_turns
 CLOSES = 1e-6  # [rad] within which a cycle comes back, up to full turns
 INNER = 4  # sub-intervals per knot interval at which the curve is held against its path
 MOST = 100_000  # intervals that may be advised
-SAFETY = 1.5
+RESOLVED = 8.0  # by at least as much the error falls on twice the intervals, once they resolve the path
+SAFETY = (1.5, 5.0)  # on the measured error, where the knots resolve the path and where they do not
 
 
 def curve(problem: Problem, time: Array, q: Array) -> CubicSpline:
@@ -80,8 +81,8 @@ def steps_needed(problem: Problem, time: Array, off: float, allowed: float) -> i
     The path itself, splined through its points at the knots, shows how that error falls with their number (as its fourth
     power, once they resolve it); the curve's is larger by a factor, measured on the knots it has. None: no number does.
     """
-    here = _of_path(problem, len(time) - 1)
-    factor = SAFETY * max(off / here, 1.0) if here > 0 else np.inf
+    here, halved = (_of_path(problem, count * (len(time) - 1)) for count in (1, 2))
+    factor = SAFETY[here < RESOLVED * halved] * max(off / here, 1.0) if here > 0 else np.inf
     if not factor * _of_path(problem, MOST) <= allowed:
         return None
     low, high = len(time) - 1, MOST

@@ -53,6 +53,7 @@ class Evaluation:
     energy_integral_spline: float  # of the cubic spline through the knots, independent of the grid's quadrature
     tracking_error_between: float  # largest along the curve that is exported, between knots too
     orientation_error_between: float
+    on_path: bool  # whether both are within the tolerances of the path
     clearance: Array  # (N + 1,) [m] smallest distance of a moving link from an obstacle; infinite without obstacles
     clearance_between: float  # smallest along that spline
     limit_excess: dict[str, float]  # by kind, at the knots, relative; see limit_excess()
@@ -138,7 +139,7 @@ def evaluate(problem: Problem, solution: Solution) -> Evaluation:
     if status is Status.SOLVED:
         status, message = _judge(moving, tracking, turned, excess, solution)
     if status is Status.SOLVED:
-        status, message = _judge_between(problem, off, solution, message)
+        status, message = _judge_between(problem, off, tracking, turned, solution)
     return Evaluation(
         solution=solution,
         status=status,
@@ -167,6 +168,9 @@ def evaluate(problem: Problem, solution: Solution) -> Evaluation:
         energy_integral_spline=spline_integral,
         tracking_error_between=off.distance,
         orientation_error_between=off.angle,
+        on_path=bool(
+            off.distance <= problem.reference.tolerance and off.angle <= problem.reference.orientation_tolerance
+        ),
         clearance=clearance,
         clearance_between=clear_between,
         limit_excess=excess,
@@ -193,19 +197,31 @@ def _judge(
     return Status.SOLVED, solution.message
 
 
-def _judge_between(problem: Problem, off: OffPath, solution: Solution, message: str) -> tuple[Status, str]:
-    """The curve that is exported, against the tolerances of the path; and what there is to say of a cycle that winds."""
+def _judge_between(
+    problem: Problem, off: OffPath, tracking: Array, turned: Array, solution: Solution
+) -> tuple[Status, str]:
+    """The curve that is exported: between the knots it may be off by the tolerances of the path more than at them, where
+    the method's own promise holds; and what there is to say of a cycle that winds.
+    """
+    message = solution.message
     reference, time, arm = problem.reference, solution.trajectory.time, problem.task.arm
-    for error, allowed, unit, key, at in (
-        (off.distance, reference.tolerance, "m", "tolerance", off.at[0]),
-        (off.angle, reference.orientation_tolerance, "rad", "orientation_tolerance", off.at[1]),
+    for error, own, allowed, unit, key, at in (
+        (off.distance, tracking, reference.tolerance, "m", "tolerance", off.at[0]),
+        (off.angle, turned, reference.orientation_tolerance, "rad", "orientation_tolerance", off.at[1]),
     ):
-        if error > allowed:
+        if error > allowed and not message:
+            promise = (
+                "which promises its knots alone" if solution.knots_only else "within what it promises at its knots"
+            )
+            message = f"{solution.method} is up to {error:.2g} {unit} off its path, {promise}"
+        if error > own.max() + allowed and not solution.knots_only:
             return Status.UNCONFIRMED, (
                 f"between its knots the motion is up to {error:.2g} {unit} off its path (at t = {at:.3g} s), more than "
                 f"path.{key} = {allowed:g} {unit}; {_advice(problem, time, error, allowed)}"
             )
-    turns = turns_of_cycle(problem, solution.trajectory.q[:, arm.joints]) if problem.boundary is Boundary.CYCLIC else None
+    turns = (
+        turns_of_cycle(problem, solution.trajectory.q[:, arm.joints]) if problem.boundary is Boundary.CYCLIC else None
+    )
     if turns is not None and np.any(turns):
         names = arm.description.joints[arm.base.count :]
         wound = [f"{name} {turn / (2 * np.pi):+.0f}" for name, turn in zip(names, turns, strict=True) if turn]

@@ -65,9 +65,7 @@ def _table(file: File) -> pd.DataFrame:
         repeated = sorted({name for name in names if names.count(name) > 1})
         if repeated:
             raise PathError(f"path.file = {file}: the header has the column {', '.join(repeated)} twice")
-        table = pd.read_csv(
-            file, skipinitialspace=True, comment="#", dtype=str, nrows=MOST + 1, encoding="utf-8-sig"
-        )
+        table = pd.read_csv(file, skipinitialspace=True, comment="#", dtype=str, nrows=MOST + 1, encoding="utf-8-sig")
     except (ValueError, OSError, csv.Error) as error:
         if isinstance(error, PathError):
             raise
@@ -75,7 +73,9 @@ def _table(file: File) -> pd.DataFrame:
     if not isinstance(table.index, pd.RangeIndex):
         raise PathError(f"path.file = {file}: the rows of the data hold more values than the header has columns")
     if len(table) > MOST:
-        raise PathError(f"path.file = {file}: more than {MOST:,} way-points; a smooth curve needs fewer, so thin them out")
+        raise PathError(
+            f"path.file = {file}: more than {MOST:,} way-points; a smooth curve needs fewer, so thin them out"
+        )
     table.columns = pd.Index(names)
     return table
 

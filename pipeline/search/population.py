@@ -74,7 +74,9 @@ def _close(problem: Problem, times: Array, motions: Array) -> Array:
     target = np.tile(problem.reference.position(times), (count, 1))
     closed, error = project(problem.task, moved.reshape(-1, n), target, tolerance=1e-9)
     closed = closed.reshape(moved.shape)
-    fine = (error.reshape(count, knots).max(axis=1) < 1e-6) & (np.abs(closed[:, -1] - closed[:, 0] - turns).max(axis=1) < 1e-6)
+    fine = (error.reshape(count, knots).max(axis=1) < 1e-6) & (
+        np.abs(closed[:, -1] - closed[:, 0] - turns).max(axis=1) < 1e-6
+    )
     return closed[fine]
 
 

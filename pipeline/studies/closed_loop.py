@@ -107,10 +107,21 @@ class ClosedLoop(Result):
         return {"closed_loop": draw(self, title)}
 
 
-def study(motions: Motions) -> ClosedLoop | None:
-    """Where it is asked for and there is a motion to export."""
+class NotRun(Result):
+    """There is no motion to follow."""
+
+    name = "closed_loop"
+
+    def section(self) -> list[str]:
+        return ["Closed loop: not simulated, since no motion is exported."]
+
+
+def study(motions: Motions) -> Result | None:
+    """Where it is asked for."""
     config, motion = motions.config.closed_loop, chosen(motions)
-    return None if motion is None or not config.run else simulate(motions.problem, motion, config)
+    if not config.run:
+        return None
+    return NotRun() if motion is None else simulate(motions.problem, motion, config)
 
 
 def effort_limits(problem: Problem) -> Array:

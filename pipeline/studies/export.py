@@ -70,7 +70,10 @@ class Nothing(Result):
     name = "export"
 
     def section(self) -> list[str]:
-        return ["Exported: nothing, since no confirmed motion keeps every limit (export.method names one anyway)."]
+        return [
+            "Exported: nothing, since no confirmed motion keeps every limit and its path, to path.tolerance between its knots too "
+            "(export.method names one anyway)."
+        ]
 
 
 def study(motions: Motions) -> Result | None:
@@ -84,13 +87,13 @@ def study(motions: Motions) -> Result | None:
 def chosen(motions: Motions) -> Evaluation | None:
     """The motion to export; None if there is no confirmed one, or none is asked for.
 
-    The best one keeps every limit and every clearance at its knots: a method that knows none may go cheaply through a
+    The best one keeps every limit and every clearance at its knots, and its path between them too: a method that knows none may go cheaply through a
     wall. Of a method with several optima, and of all methods, it is the cheapest by the problem's own objective.
     """
     asked = motions.config.export.method
     good = [e for e in motions.solved if asked in ("best", e.method)]
     if asked == "best":
-        good = [e for e in good if max(e.limit_excess.values(), default=0.0) <= LIMITS]
+        good = [e for e in good if max(e.limit_excess.values(), default=0.0) <= LIMITS and e.on_path]
     return min(good, key=lambda e: e.objective, default=None)
 
 
