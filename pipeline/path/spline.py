@@ -16,13 +16,13 @@ CUSP = 0.02  # of the chords' speed: where a curve is slower than that it turns 
 
 
 class Spline:
-    """A cubic spline (C2) through `points` (P, m) [m], reparametrised by arc length."""
+    """A cubic spline (C2) through `points` (P, m) [m], reparametrised by arc length; `first` is its number in messages."""
 
-    def __init__(self, points: Array) -> None:
+    def __init__(self, points: Array, first: int = 1) -> None:
         chord = np.linalg.norm(np.diff(points, axis=0), axis=1)
         knots = np.concatenate([[0.0], np.cumsum(chord)])
         self._curve = CubicSpline(knots, points) if len(points) > 2 else CubicSpline(knots, points, bc_type="natural")
-        self._require_smooth(knots)
+        self._require_smooth(knots, first)
         # Arc length by 8-point Gauss-Legendre on short pieces, then its inverse by Newton from a linear guess.
         nodes, weights = np.polynomial.legendre.leggauss(8)
         self._u = np.linspace(0.0, knots[-1], max(4, min(PIECES, MOST_PIECES // len(points))) * len(points))
@@ -32,30 +32,33 @@ class Spline:
         self._s = np.concatenate([[0.0], np.cumsum(pieces)])
         self._gauss = nodes, weights
         self.length = float(self._s[-1])
-        self.marks = np.interp(knots, self._u, self._s)  # (P,) [m] where along the curve the points lie
+        self.marks = self._arc(knots)  # (P,) [m] where along the curve the points lie
 
-    def _require_smooth(self, knots: Array) -> None:
+    def _require_smooth(self, knots: Array, first: int) -> None:
         """Raise PathError where the curve all but stops: by arc length it would turn on the spot, at full speed."""
         inner = (knots[:-1, None] + np.diff(knots)[:, None] * np.linspace(0.0, 1.0, 17)[:-1]).ravel()
         speed = np.linalg.norm(self._curve(inner, 1), axis=1)
         slowest = int(np.argmin(speed))
         if speed[slowest] < CUSP:
-            chord = slowest // 16 + 1
+            chord = slowest // 16 + first
             raise PathError(
                 f"path: the smooth curve turns back on itself between way-points {chord} and {chord + 1}; give more "
                 "way-points there, or path.corners=rest"
             )
 
+    def _arc(self, u: Array) -> Array:
+        """The arc length [m] up to u (K,)."""
+        left = np.clip(np.searchsorted(self._u, u, side="right") - 1, 0, len(self._u) - 2)
+        nodes, weights = self._gauss
+        half = ((u - self._u[left]) / 2)[:, None]
+        speed = np.linalg.norm(self._curve(self._u[left][:, None] + half * (1 + nodes), 1), axis=2)
+        return np.asarray(self._s[left] + (half * weights * speed).sum(axis=1))
+
     def _parameter(self, s: Array) -> Array:
         s = np.clip(s, 0.0, self.length)
         u = np.interp(s, self._s, self._u)
-        left = np.clip(np.searchsorted(self._s, s, side="right") - 1, 0, len(self._u) - 2)
-        nodes, weights = self._gauss
         for _ in range(4):
-            half = ((u - self._u[left]) / 2)[:, None]
-            speed = np.linalg.norm(self._curve(self._u[left][:, None] + half * (1 + nodes), 1), axis=2)
-            error = self._s[left] + (half * weights * speed).sum(axis=1) - s
-            u = u - error / np.linalg.norm(self._curve(u, 1), axis=1)
+            u = u - (self._arc(u) - s) / np.linalg.norm(self._curve(u, 1), axis=1)
         return np.clip(u, self._u[0], self._u[-1])
 
     def sample(self, s: Array) -> tuple[Array, Array, Array]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -48,10 +49,10 @@ def through(points: Array, rotations: Rotation | None, *, rest: bool = False) ->
     pieces: list[Geometry] = []
     oriented: list[Sampled] = []
     marks, ends = np.zeros(len(own)), [0.0]
-    for first, last in zip(breaks[:-1], breaks[1:], strict=True):
+    for first, last in pairwise(breaks):
         part = slice(first, last + 1)
         if moves[first] > SAME:
-            piece: Geometry = (spline := Spline(own[part]))
+            piece: Geometry = (spline := Spline(own[part], int(kept[first]) + 1))
             local = spline.marks
         else:
             local = TURN * np.concatenate([[0.0], np.cumsum(turns[first:last])])

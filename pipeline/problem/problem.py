@@ -17,7 +17,6 @@ from pipeline.problem.integrals import ByIntegral
 from pipeline.problem.limits import Limits
 from pipeline.problem.objective import Objective
 
-
 CLOSED = 1e-9  # [m] and [rad]: between the ends of a closed path
 
 
