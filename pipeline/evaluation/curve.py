@@ -16,8 +16,7 @@ from pipeline.problem.turns import full_turns
 CLOSES = 1e-6  # [rad] within which a cycle comes back, up to full turns
 INNER = 4  # sub-intervals per knot interval at which the curve is held against its path
 MOST = 100_000  # intervals that may be advised
-RESOLVED = 8.0  # by at least as much the error falls on twice the intervals, once they resolve the path
-SAFETY = (1.5, 5.0)  # on the measured error, where the knots resolve the path and where they do not
+SAFETY = (1.5, 5.0)  # on the measured error: for at most twice the knots, and for more
 
 
 def curve(problem: Problem, time: Array, q: Array) -> CubicSpline:
@@ -79,16 +78,23 @@ def steps_needed(problem: Problem, time: Array, off: float, allowed: float) -> i
     """How many even intervals would bring a curve that is `off` [m] its path on the knots `time` to within `allowed`.
 
     The path itself, splined through its points at the knots, shows how that error falls with their number (as its fourth
-    power, once they resolve it); the curve's is larger by a factor, measured on the knots it has. None: no number does.
+    power, once they resolve it); the curve's is larger by a factor, measured on the knots it has, which tells less the
+    farther it is carried. None: no number does.
     """
-    here, halved = (_of_path(problem, count * (len(time) - 1)) for count in (1, 2))
-    factor = SAFETY[here < RESOLVED * halved] * max(off / here, 1.0) if here > 0 else np.inf
-    if not factor * _of_path(problem, MOST) <= allowed:
+    count, here = len(time) - 1, _of_path(problem, len(time) - 1)
+    factor = max(off / here, 1.0) if here > 0 else np.inf
+    near, far = (_least(problem, count, allowed / (safety * factor)) for safety in SAFETY)
+    return near if near is not None and near <= 2 * count else far
+
+
+def _least(problem: Problem, low: int, allowed: float) -> int | None:
+    """The number of intervals, rounded up to two digits, on which the path's own spline is within `allowed` [m] of it."""
+    high = MOST
+    if not _of_path(problem, high) <= allowed:
         return None
-    low, high = len(time) - 1, MOST
     while high > 1.02 * low + 1:
         middle = int(np.sqrt(low * high))
-        low, high = (low, middle) if factor * _of_path(problem, middle) <= allowed else (middle, high)
+        low, high = (low, middle) if _of_path(problem, middle) <= allowed else (middle, high)
     return int(float(f"{high * 1.04:.1e}"))
 
 
