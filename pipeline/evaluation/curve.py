@@ -42,11 +42,13 @@ def turns_of_cycle(problem: Problem, q: Array) -> Array | None:
 
 def whole(problem: Problem, time: Array, q: Array) -> Callable[..., Array]:
     """The same curve with a moving base's coordinates before the joints': for q (N + 1, n)."""
-    nb = problem.task.arm.base.count
+    base_of, nb = problem.task.arm.base, problem.task.arm.base.count
     joints = curve(problem, time, q[:, nb:])
     if not nb:
         return joints
-    base = CubicSpline(time, q[:, :nb])
+    rest = problem.reference.timing.at_rest and problem.boundary is not Boundary.CYCLIC
+    still = rest and not any(base_of.spacecraft.momentum)
+    base = CubicSpline(time, q[:, :nb], bc_type="clamped" if still else "not-a-knot")
     return lambda moment, order=0: np.hstack([base(moment, order), joints(moment, order)])
 
 
