@@ -7,7 +7,7 @@ import numpy as np
 from pipeline.common.errors import ConfigError, PathError
 from pipeline.model.clearance import Clearance
 from pipeline.model.kinematics import ATTEMPTS, reach
-from pipeline.problem.problem import Boundary, Problem
+from pipeline.problem.problem import CLOSED, Boundary, Problem
 from pipeline.robot.limits import require_room
 
 
@@ -36,14 +36,11 @@ def check_problem(problem: Problem) -> None:
                     f"robot.q_init: {link} is {distance:.3g} m from obstacle {obstacle}, less than obstacles.margin = "
                     f"{problem.obstacles.margin:g} m, and boundary = fixed starts there"
                 )
-    if problem.boundary is Boundary.CYCLIC:
-        ends = problem.reference.position(np.array([0.0, problem.reference.duration]))
-        gap = float(np.linalg.norm(ends[1] - ends[0]))
-        if gap > 1e-9:
-            raise PathError(
-                f"boundary = cyclic: the path ends {gap:.3g} m{' and rad' * (len(ends[0]) > 3)} from where it starts; "
-                "a cycle needs a closed path"
-            )
+    if problem.boundary is Boundary.CYCLIC and not problem.closed_path:
+        gaps = [f"{gap:.3g} {unit}" for gap, unit in zip(problem.gap, ("m", "rad"), strict=True) if gap > CLOSED]
+        raise PathError(
+            f"boundary = cyclic: the path ends {' and '.join(gaps)} from where it starts; a cycle needs a closed path"
+        )
 
 
 def require_reach(problem: Problem) -> None:

@@ -21,6 +21,7 @@ from omegaconf.errors import OmegaConfBaseException
 
 from pipeline.common.errors import InputError, OutputError
 from pipeline.common.files import shipped
+from pipeline.config.as_written import keep_as_written
 from pipeline.run import completion, session
 from pipeline.run.refusals import in_one_line, refuse
 
@@ -33,6 +34,7 @@ def job(values: DictConfig) -> int:
     from pipeline.config.compose import checked
     from pipeline.run import resume
     from pipeline.run.run import run
+    from pipeline.run.unused import unused
 
     hydra_values = HydraConfig.get()
     folder, sweeping = Path(hydra_values.runtime.output_dir), hydra_values.mode is RunMode.MULTIRUN
@@ -44,6 +46,8 @@ def job(values: DictConfig) -> int:
             return done
         if sweeping:
             resume.forget(folder)
+        for line in unused(hydra_values.overrides.task, config):
+            print(f"warning: {line}", file=sys.stderr)
         code = run(config, folder)
     except InputError as error:
         print(f"error: {error}", file=sys.stderr)
@@ -85,6 +89,7 @@ def run_job(
     os.environ["HYDRA_FULL_ERROR"] = "1"
     try:
         refuse(asked)
+        keep_as_written()
         hydra.main(version_base="1.3", config_path=CONF, config_name="config")(job)()
     except InputError as error:
         return _complain(str(error))
