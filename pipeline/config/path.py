@@ -12,6 +12,10 @@ Direction = OneOrList[Number]
 START = "[m] task coordinates of the start; null: the end effector at robot.q_init"
 
 
+Turn = Annotated[Number, Field(ge=-1000, le=1000)]  # [rad]: a hundred and fifty times round
+Turns = Annotated[tuple[Turn, ...], Field(min_length=3, max_length=3)]
+
+
 def _finer(row: tuple[float, ...]) -> tuple[float, ...]:
     if len(row) != 3 or not 0 <= row[0] < row[1] or not row[2] > 0:
         raise ValueError("must be [from s, to s, factor] with 0 <= from < to and factor > 0")
@@ -25,7 +29,10 @@ class PathConfig:
     orientation: Annotated[
         Vector | None, Field(description="[rad] roll, pitch, yaw at the start, for such tasks; null: at robot.q_init")
     ] = None
-    turn: Annotated[Vector, Field(description="[rad] rotation vector by which it turns to the end, in the world")] = (
+    turn: Annotated[
+        Annotated[tuple[Turn, ...], Field(min_length=3, max_length=3)],
+        Field(description="[rad] rotation vector by which it turns to the end, in the world"),
+    ] = (
         0.0,
         0.0,
         0.0,
@@ -58,7 +65,7 @@ class CircleConfig(PathConfig):
         Direction, Field(description="[deg] angle from the start to the centre in the task plane, or a vector")
     ] = 180.0
     clockwise: Annotated[Switch, Field(description="which way round, seen against `normal`")] = False
-    angle: Annotated[Number, Field(gt=0, description="[deg] how much of the circle")] = 360.0
+    angle: Annotated[Number, Field(gt=0, le=360_000, description="[deg] how much of the circle")] = 360.0
     normal: Annotated[Vector, Field(description="of the circle's plane, for tasks in space")] = (0.0, 0.0, 1.0)
     start: Annotated[Numbers | None, Field(description=START)] = None
 
