@@ -46,6 +46,7 @@ Prediction = Annotated[
     Field(description="of a prediction; problem: the problem's, kinetic energy in place of torques"),
 ]
 Drift = Annotated[Positive, Field(description="[m] tracking error above which the motion is not confirmed")]
+Apart = Annotated[Number, Field(gt=0, le=3.14)]  # [rad]: no two joint angles are farther apart, but for full turns
 
 
 @schema
@@ -138,7 +139,7 @@ class GlobalOptions:
     max_iterations: Iterations = 300
     max_time: MaxTime = None
     same_path: Annotated[
-        Positive, Field(description="[rad] motions that differ by less at every knot are the same optimum")
+        Apart, Field(description="[rad] motions that differ by less at every knot, but for full turns, are one optimum")
     ] = 0.05
 
 
@@ -154,7 +155,9 @@ class DynamicProgrammingOptions:
     velocity_slack: Annotated[
         Number, Field(ge=0, description="node spacings by which a step may exceed a velocity limit")
     ] = 0.0
-    same_path: Annotated[Positive, Field(description="[rad] paths closer than this are the same optimum")] = 0.2
+    same_path: Annotated[
+        Apart, Field(description="[rad] paths closer than this, but for full turns, are one optimum")
+    ] = 0.2
 
 
 @schema
@@ -188,7 +191,7 @@ class PontryaginOptions:
     ] = 1e-9
     max_nodes: Annotated[Whole, Field(ge=10, le=MOST_KNOTS, description="of the mesh it ends on")] = 20000
     same_path: Annotated[
-        Positive, Field(description="[rad] extremals that differ by less at every knot are the same")
+        Apart, Field(description="[rad] extremals that differ by less at every knot, but for full turns, are the same")
     ] = 0.01
 
 

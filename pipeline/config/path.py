@@ -37,6 +37,12 @@ class PathConfig:
         0.0,
         0.0,
     )
+    tolerance: Annotated[Number, Field(gt=0, description="[m] how far from it a motion may be between its knots")] = (
+        1e-4
+    )
+    orientation_tolerance: Annotated[
+        Number, Field(gt=0, description="[rad] the same of the orientation, where one is prescribed")
+    ] = 1e-3
 
 
 @schema
@@ -44,7 +50,7 @@ class LineConfig(PathConfig):
     """`path=line`: straight, `length` m along `direction`."""
 
     kind: Literal["line"] = "line"
-    length: Annotated[Number, Field(gt=0, description="[m] length of the line")] = 0.4
+    length: Annotated[Number, Field(ge=0, description="[m] length of the line; 0: it turns on the spot")] = 0.4
     direction: Annotated[Direction, Field(description="[deg] angle in the task plane, or a vector")] = 157.5
     start: Annotated[Numbers | None, Field(description=START)] = None
 
@@ -69,8 +75,14 @@ class WaypointsConfig(PathConfig):
     """`path=waypoints`: a smooth curve through the rows of a CSV file."""
 
     kind: Literal["waypoints"] = "waypoints"
-    file: Annotated[Text, Field(description="CSV file with header x,y or x,y,z and values in m")] = ""
+    file: Annotated[
+        Text, Field(description="CSV file with header x,y or x,y,z, in m; orientations and times beside")
+    ] = ""
     relative: Annotated[Switch, Field(description="shift the curve so that it starts at the end effector")] = False
+    corners: Annotated[
+        Literal["smooth", "rest"],
+        Field(description="rest: straight from one way-point to the next, with a stop at each"),
+    ] = "smooth"
 
 
 @schema
@@ -78,9 +90,10 @@ class TimingConfig:
     """Group `timing`: the law s(t), the motion time and the number of intervals of the global grid."""
 
     law: Annotated[
-        Literal["raised_cosine", "constant_speed", "quintic"], Field(description="how the path is run through in time")
+        Literal["raised_cosine", "constant_speed", "quintic", "from_file"],
+        Field(description="how the path is run through in time; from_file: by the column time of path.file"),
     ] = "raised_cosine"
-    duration: Annotated[Number, Field(gt=0, description="[s] motion time")] = 10.0
+    duration: Annotated[Number, Field(gt=0, description="[s] motion time, unless it is from_file")] = 10.0
     steps: Annotated[Whole, Field(ge=2, le=100_000, description="intervals of the grid of the global optimum")] = 100
     dense: Annotated[
         tuple[Annotated[Numbers, AfterValidator(_finer)], ...],

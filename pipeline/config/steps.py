@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from typing import Any
 
 from pipeline.common.errors import ConfigError
-
-if TYPE_CHECKING:
-    from pipeline.config.run import RunConfig
 
 MOST_STEPS = 100_000  # every one is evaluated, drawn and recorded
 MOST_SAMPLES = 1_000_000  # every one is simulated, no more
 STEPS = ("dt", "prediction_step", "update_interval")
 
 
-def refuse_endless(config: RunConfig) -> None:
-    """Raise ConfigError for the first of them that is too many."""
+def refuse_endless(config: Any) -> None:
+    """Raise ConfigError for the first of them that is too many in `config`, the RunConfig that is being made."""
     duration = config.timing.duration
     for key, value, count, most in _counts(config):
         if count > most:
@@ -26,7 +23,7 @@ def refuse_endless(config: RunConfig) -> None:
             )
 
 
-def _counts(config: RunConfig) -> Iterator[tuple[str, float, float, int]]:
+def _counts(config: Any) -> Iterator[tuple[str, float, float, int]]:
     """Key, value, number of steps and its bound."""
     duration = config.timing.duration
     for method in config.methods:

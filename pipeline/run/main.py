@@ -17,6 +17,7 @@ from omegaconf import DictConfig
 
 from pipeline.common.errors import OutputError
 from pipeline.common.files import shipped
+from pipeline.config.as_written import keep_as_written
 from pipeline.run import completion, ownership, session
 from pipeline.run.failures import foreseen, leaves, told, where
 from pipeline.run.refusals import refuse
@@ -31,6 +32,7 @@ def job(values: DictConfig) -> int:
     from pipeline.config.compose import checked
     from pipeline.run import resume
     from pipeline.run.run import run
+    from pipeline.run.unused import unused
 
     hydra_values = HydraConfig.get()
     folder, sweeping = Path(hydra_values.runtime.output_dir), hydra_values.mode is RunMode.MULTIRUN
@@ -47,6 +49,8 @@ def job(values: DictConfig) -> int:
             print(f"{folder.name}: finished before, skipped (sweep.resume)", flush=True)
             return done
         resume.forget(folder)
+        for line in unused(hydra_values.overrides.task, config):
+            print(f"warning: {line}", file=sys.stderr)
         code = run(config, folder)
     except BaseException as error:
         if leaves(error):
@@ -92,6 +96,7 @@ def run_job(
     try:
         with terminable():
             refuse(asked)
+            keep_as_written()
             hydra.main(version_base="1.3", config_path=CONF, config_name="config")(job)()
     except BaseException as error:
         if isinstance(error, SystemExit) and not isinstance(error.code, str):

@@ -48,7 +48,9 @@ class Session(Callback):
         """Raise InputError if the job cannot be done. The problem that is built for this is kept for the run."""
         from pipeline.common.workers import Workers
         from pipeline.run.state import keep
+        from pipeline.run.unused import require_motion
 
+        require_motion(asked)
         keep(asked)
         Workers(address=asked.parallel.address).check()
 

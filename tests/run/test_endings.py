@@ -1,4 +1,4 @@
-"""A run that is ended from outside: nobody is left behind, nothing half-written stays, and a new start ends the same."""
+"""A run that is ended from outside leaves nobody behind and nothing half-written, and a new start ends the same."""
 
 from __future__ import annotations
 
