@@ -113,7 +113,7 @@ def test_a_run_that_is_ended_goes_on(
 def test_a_sweep_leaves_no_thread(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Rerun's streams, a run's and its blueprint's, have two threads each until they are told to go."""
     monkeypatch.chdir(tmp_path)
-    words = ("-m", "methods=[lsv]", "timing.steps=10", "method.lsv.dt=0.1", "export.method=none")
+    words = ("-m", "methods=[lsv]", "path.length=0.05", "export.method=none")
 
     def after(seeds: str) -> int:
         assert call(monkeypatch, None, *words, f"seed={seeds}", f"hydra.sweep.dir=of{len(seeds)}").code == 0
