@@ -1,4 +1,4 @@
-"""What many tests need: arms, problems and configurations by name, central differences, and solids with their distances."""
+"""What many tests need: arms, problems and configurations by name, central differences, solids with their distances."""
 
 from __future__ import annotations
 
@@ -56,6 +56,7 @@ FEW = GlobalOptions(configurations=12, candidates=150, optimised=6)
 FEW_STARTS = tuple(f"method.global.{key}={getattr(FEW, key)}" for key in ("configurations", "candidates", "optimised"))
 
 
+@cache
 def composed(*overrides: str) -> config.RunConfig:
     """The checked configuration of a command line."""
     with initialize_config_dir(str(ROOT / "conf"), version_base="1.3"):
@@ -78,7 +79,7 @@ def within_limits(arm: Arm, count: int, rng: np.random.Generator) -> Array:
     return rng.uniform(low, np.minimum(arm.description.upper, np.pi), size=(count, arm.n))
 
 
-# --- solids ---------------------------------------------------------------------------------------------------------------
+# --- solids -----------------------------------------------------------------------------------------------------------
 
 BALL = Shape("ball", "sphere", (0.06,), (0.25, 0.2, 0.3))
 ROD = capsule("rod", np.array([-0.4, 0.3, 0.1]), np.array([-0.2, 0.5, 0.7]), 0.04)
@@ -124,8 +125,8 @@ def _between_segments(a: Array, b: Array) -> Array:
 
 
 def segment_distances(arm: Arm, others: tuple[Shape, ...], q: Array) -> Array:
-    """The smallest distance (K,) [m] of the arm's moving spheres and capsules from `others` at q (K, n), without Drake's
-    geometry: between segments, less the radii.
+    """The smallest distance (K,) [m] of the arm's moving spheres and capsules from `others` at q (K, n), without
+    Drake's geometry: between segments, less the radii.
     """
     distances = []
     for shape in arm.description.collision:

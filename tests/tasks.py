@@ -13,12 +13,12 @@ from pathlib import Path
 HUNG = 1800.0  # [s]: whatever a test waits for comes much sooner, on a busy machine too
 
 
-def wait_until(ready: Callable[[], bool]) -> None:
+def wait_until(ready: Callable[[], bool], pause: float = 0.01) -> None:
     until = time.monotonic() + HUNG
     while not ready():
         if time.monotonic() > until:
             raise TimeoutError(f"waited {HUNG:g} s in vain")
-        time.sleep(0.01)
+        time.sleep(pause)
 
 
 @dataclass(frozen=True)

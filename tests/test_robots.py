@@ -1,4 +1,4 @@
-"""The planner and its program on real and on more redundant arms: every derivative, every method, independent optima."""
+"""The planner and its program on real and on more redundant arms: all derivatives, all methods, independent optima."""
 
 from __future__ import annotations
 

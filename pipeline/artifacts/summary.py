@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from scipy.spatial.transform import Rotation
 
 from pipeline.artifacts.markdown import markdown
 from pipeline.artifacts.report import Report
@@ -63,20 +62,13 @@ def _differences(row: Mapping[str, Any], printed: Mapping[str, float]) -> dict[s
 
 
 def trajectories(evaluations: Sequence[Evaluation]) -> pd.DataFrame:
-    """The long table: method, optimum, time, q_1..n, qd_1..n, qdd_1..n, tau_1..n, x, y, z; of a floating base its
-    position base_x, .. and rotation vector base_rx, .. in the world.
-    """
+    """The long table: method, optimum, then the columns of `Evaluation.to_frame`."""
     parts = []
     for e in evaluations:
-        columns: dict[str, Any] = {"method": e.method, "optimum": e.solution.optimum, "time": e.time}
-        for name, values in (("q", e.q), ("qd", e.qd), ("qdd", e.qdd), ("tau", e.tau)):
-            columns |= {f"{name}_{j + 1}": values[:, j] for j in range(values.shape[1])}
-        columns |= dict(zip("xyz", e.position.T, strict=True))
-        if e.base.reaction is None:
-            turned = Rotation.from_matrix(e.base.rotation).as_rotvec()
-            columns |= {f"base_{axis}": column for axis, column in zip("xyz", e.base.position.T, strict=True)}
-            columns |= {f"base_r{axis}": column for axis, column in zip("xyz", turned.T, strict=True)}
-        parts.append(pd.DataFrame(columns))
+        part = e.to_frame()
+        part.insert(0, "method", e.method)
+        part.insert(1, "optimum", e.solution.optimum)
+        parts.append(part)
     return pd.concat(parts, ignore_index=True)
 
 

@@ -104,8 +104,8 @@ def _spacecraft(base: FreeBaseConfig, arm: Arm) -> Spacecraft:
     a, b, c = np.linalg.eigvalsh(inertia)
     if a < 0 or a + b < c * (1 - 1e-9):
         raise ConfigError(
-            f"base.inertia = {shown(base.inertia)}: no body has the principal moments {a:.3g}, {b:.3g}, {c:.3g} kg m^2; each is at "
-            "most the sum of the others"
+            f"base.inertia = {shown(base.inertia)}: no body has the principal moments "
+            f"{a:.3g}, {b:.3g}, {c:.3g} kg m^2; each is at most the sum of the others"
         )
     rows = tuple(tuple(map(float, row)) for row in inertia)
     return Spacecraft(base.mass, rows, tuple(base.com), momentum)

@@ -19,7 +19,8 @@ def check_problem(problem: Problem) -> None:
         require_room(description, key, values)
     for joint in np.flatnonzero(limits.lower >= limits.upper):
         raise ConfigError(
-            f"limits.lower of {names[joint]} ({limits.lower[joint]:.4g}) is not below limits.upper ({limits.upper[joint]:.4g})"
+            f"limits.lower of {names[joint]} ({limits.lower[joint]:.4g}) is not below limits.upper "
+            f"({limits.upper[joint]:.4g})"
         )
     if problem.boundary is Boundary.FIXED:
         outside = np.flatnonzero((problem.q_init < limits.lower) | (problem.q_init > limits.upper))

@@ -57,8 +57,8 @@ def make_objective(config: RunConfig, arm: Arm) -> Objective:
     ranges = make_limits(replace(config.limits, kind="joint"), arm)
     if "joint_centering" in own.criteria and not np.isfinite(ranges.upper - ranges.lower).any():
         raise ConfigError(
-            f"objective.secondary = {own.secondary}: {arm.description.name} states no joint limits to centre its joints in; "
-            "give limits.lower and limits.upper"
+            f"objective.secondary = {own.secondary}: {arm.description.name} states no joint limits to centre its "
+            "joints in; give limits.lower and limits.upper"
         )
     return Objective(own.weights, Secondary(own.criteria, own.k0, ranges.lower, ranges.upper))
 
@@ -69,8 +69,8 @@ def make_obstacles(obstacles: ObstaclesConfig, arm: Arm) -> Obstacles | None:
     if not arm.description.collision:
         meshes = f" (those of {', '.join(arm.description.meshes)} are meshes)" if arm.description.meshes else ""
         raise ConfigError(
-            f"obstacles.shapes: {arm.description.name} has no primitive collision shapes{meshes}; give spheres, boxes or "
-            "capsules in robot.collision"
+            f"obstacles.shapes: {arm.description.name} has no primitive collision shapes{meshes}; give spheres, boxes "
+            "or capsules in robot.collision"
         )
     shapes = tuple(make_shape(name, shape) for name, shape in obstacles.shapes.items())
     return Obstacles(shapes, obstacles.margin, obstacles.influence)

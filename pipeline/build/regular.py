@@ -1,4 +1,4 @@
-"""Refuse an arm whose mass matrix is singular wherever it stands: nothing could be said of its joints' accelerations."""
+"""Refuse an arm whose mass matrix is singular wherever it stands: its joints' accelerations would be anything."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ SAMPLES = 4
 
 
 def require_regular(arm: Arm) -> None:
-    """Raise RobotError that names the link, or ConfigError that names base.inertia, if M is singular by construction."""
+    """Raise RobotError naming the link, or ConfigError naming base.inertia, if M is singular by construction."""
     q = np.random.default_rng(0).uniform(-1.0, 1.0, (SAMPLES, arm.n))
     mass = arm.mass_matrix(q)
     diagonal = np.einsum("kii->ki", mass)
@@ -37,6 +37,6 @@ def require_regular(arm: Arm) -> None:
     several = len(names) > 1
     raise RobotError(
         f"robot.urdf = {description.file}: link{'s' * several} {', '.join(links)}: moving joint{'s' * several} "
-        f"{', '.join(names)} moves no mass, since all of it lies on the ax{'e' if several else 'i'}s and has no inertia, so "
-        "that the mass matrix is singular; give the link an inertia, or robot.armature"
+        f"{', '.join(names)} moves no mass, since all of it lies on the ax{'e' if several else 'i'}s and has no "
+        "inertia, so that the mass matrix is singular; give the link an inertia, or robot.armature"
     )

@@ -20,7 +20,7 @@ def write_beside(file: Path, write: Callable[[Path], Any]) -> None:
 
 
 def shipped(name: str) -> Path:
-    """What travels with the package, such as `conf` or `robots/planar3r.urdf`: within it, or beside it in a checkout."""
+    """What travels with the package, such as `conf` or `robots/planar3r.urdf`: in it, or beside it in a checkout."""
     package = Path(__file__).resolve().parents[1]
     inside = package / name
     return inside if inside.exists() else package.parent / name

@@ -36,7 +36,7 @@ _DIGEST = hashlib.sha256().digest_size
 
 @dataclass(frozen=True)
 class Workers:
-    """How work is spread: `count` processes here (None: all cores), or the Dask cluster whose scheduler is at `address`.
+    """How work is spread: `count` processes here (None: all cores), or the Dask cluster of the scheduler at `address`.
 
     Finished results are kept in the folder `store` if given.
     """

@@ -181,10 +181,15 @@ _once = cache(read)  # the documents do not change while a process runs
 
 
 def _cells(document: Document, experiment: str) -> dict[str, dict[str, float]]:
-    """The numbers that are cells of summary.csv, of first optima; the first row of those that print the same cell."""
+    """The numbers that are cells of summary.csv, of first optima; the first row of those that print the same cell.
+
+    Computing times stay out: another machine's are nothing to compare a run with.
+    """
     values: dict[str, dict[str, float]] = {}
     for _, row in document.rows:
         cell = row.found.cell
-        if cell and cell.optimum == 1 and row.between is None and row.found.experiments == (experiment,):
+        if not cell or cell.optimum != 1 or cell.column == "wall_time_s":
+            continue
+        if row.between is None and row.found.experiments == (experiment,):
             values.setdefault(cell.method, {}).setdefault(cell.column, row.value)
     return values

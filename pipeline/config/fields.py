@@ -4,7 +4,7 @@
 class TimingConfig:
     duration: Annotated[Number, Field(gt=0, description="[s] motion time")] = 10.0
 
-build(TimingConfig, {"duration": -1}, "timing")   # ConfigError: timing.duration = -1: must be a number > 0 s (motion time)
+build(TimingConfig, {"duration": -1}, "timing")  # ConfigError: timing.duration = -1: must be a number > 0 s (...)
 
 A description begins with the unit in brackets, if there is one: messages, `--help` and conf/schema.json read it there.
 """
@@ -75,7 +75,7 @@ WordOrVector = Annotated[Annotated[T, Tag("string")] | Annotated[Vector, Tag("ar
 
 @dataclass_transform(frozen_default=True, field_specifiers=(Field, field))
 def schema(cls: type[T]) -> type[T]:
-    """A frozen dataclass of pydantic; a bad argument is a ConfigError of one line, from Python as from the command line."""
+    """A frozen dataclass of pydantic; a bad argument is a ConfigError of one line, from Python as from a command."""
     made = dataclass(frozen=True, config=CHECKED)(cls)
     plain = made.__init__
 

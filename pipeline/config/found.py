@@ -71,7 +71,7 @@ class Peak(Found):
 
 @schema
 class LimitTime(Found):
-    """From or until when the planner's first optimum is at a limit [s]; a knot's velocity is that of the interval before."""
+    """From or until when the planner's first optimum is at a limit [s]; a knot's velocity is the interval's to it."""
 
     joint: Joint = 1
     limit: Annotated[Literal["velocity", "torque", "power"], Field(description="which limit")] = "velocity"

@@ -1,4 +1,4 @@
-"""One line for a bad value: the key, the value, what is allowed with its unit, what the key means, and the closest name."""
+"""One line for a bad value: the key, the value, what is allowed with its unit, what the key means, the closest name."""
 
 from __future__ import annotations
 

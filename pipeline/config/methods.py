@@ -71,7 +71,7 @@ class PmkeOptions:
 
 @schema
 class RecedingOptions:
-    """PMKE with limits: a receding horizon that keeps limits and obstacles, and whose knots are executed as they are."""
+    """PMKE with limits: a receding horizon that keeps limits and obstacles; its knots are executed as they are."""
 
     prediction_step: Annotated[Positive, Field(description="[s] spacing of the knots")] = 1.0
     horizon: Annotated[Whole, Field(ge=1, description="predicted knots")] = 2
@@ -88,9 +88,18 @@ class GlobalOptions:
     """The interpolation-based Global Kinematic Planner; counts as in its paper."""
 
     starts: Annotated[
-        Literal["population", "dynamic_programming", "both"],
-        Field(description="where the solver starts from; dynamic_programming: r = 1"),
-    ] = "population"
+        Literal["roadmap", "population", "dynamic_programming", "both"],
+        Field(
+            description="where the solver starts from; population: as in the paper; dynamic_programming: r = 1; "
+            "both: these"
+        ),
+    ] = "roadmap"
+    solver: Annotated[
+        Literal["newton", "ipopt"],
+        Field(description="newton, confirmed by ipopt, where it serves the problem (the log says so); ipopt: alone"),
+    ] = "newton"
+    nodes: Annotated[Whole, Field(ge=8, description="of the roadmap, in each layer")] = 300
+    layers: Annotated[Whole, Field(ge=2, description="of the roadmap, after the first")] = 6
     configurations: Annotated[
         Whole, Field(ge=1, description="initial ones by random self-motion (boundaries free and cyclic)")
     ] = 66
@@ -104,11 +113,14 @@ class GlobalOptions:
             description="weighted-pseudoinverse motions that are ranked; null: (points x joints)^2 of the coarsest grid"
         ),
     ] = None
-    optimised: Annotated[Whole, Field(ge=1, description="of them that are optimised on the coarsest grid")] = 48
+    optimised: Annotated[Whole, Field(ge=1, description="motions that are optimised on the coarsest grid")] = 64
     limit_weight: Annotated[
         Number, Field(ge=0, description="k_L of eq. (14): distance from the joint limits in the ranking")
     ] = 0.01
-    coarse_steps: Annotated[Whole, Field(ge=2, description="intervals of the coarsest grid, at most")] = 12
+    coarse_steps: Annotated[
+        Annotated[Whole, Field(ge=2)] | None,
+        Field(description="intervals of the coarsest grid, at most; null: 25, and 12 where ipopt works alone"),
+    ] = None
     tolerance: Tolerance = 1e-8
     max_iterations: Iterations = 300
     same_path: Annotated[
@@ -200,5 +212,5 @@ class MethodConfig:
     pontryagin_as_printed: PontryaginAsPrintedOptions = PontryaginAsPrintedOptions()
 
     def of(self, name: str) -> Any:
-        """The options of the method `name`."""
-        return getattr(self, "global_" if name == "global" else name)
+        """The options of the method `name`; None for one that has none."""
+        return getattr(self, "global_" if name == "global" else name, None)

@@ -12,7 +12,7 @@ HIDDEN = "_"  # an option that begins so is only there to be inherited from
 
 
 def chosen() -> dict[str, str]:
-    """Every group that conf/config.yaml picks from, and its pick; of the group `method`, all of whose options hold, none."""
+    """Every group that conf/config.yaml picks from, and its pick; none of `method`, all of whose options hold."""
     rows = yaml.safe_load((shipped("conf") / "config.yaml").read_text(encoding="utf-8"))["defaults"]
     pairs = [pair for row in rows if isinstance(row, dict) for pair in row.items()]
     return {group: option if isinstance(option, str) else "" for group, option in pairs if " " not in group}

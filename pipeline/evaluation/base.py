@@ -16,7 +16,7 @@ from pipeline.problem.solution import Solution, Trajectory
 
 @dataclass(frozen=True)
 class BaseMotion:
-    """What a base does: position (N + 1, 3) [m], rotation (N + 1, 3, 3) and turn from the start (N + 1,) [rad] at the knots.
+    """What a base does at the knots: position (N + 1, 3) [m], rotation (N + 1, 3, 3), turn so far (N + 1,) [rad].
 
     reaction (N + 1, 6) [N, N m]: what holds a base that stands still; None if it floats. integrals, running (N + 1,):
     base_rotation, reaction_force, reaction_torque. floating: the motion that the joints alone give; None if it stands.
@@ -33,7 +33,7 @@ class BaseMotion:
 def base_motion(
     problem: Problem, solution: Solution, place: Array, way: Array, turn: Array, joints: tuple[Array, Array, Array]
 ) -> BaseMotion:
-    """What the base does: pose at the knots, from the solution; the rest from the joint motion alone (`free_body.py`)."""
+    """What the base does: its pose at the knots from the solution, the rest from the joints alone (`free_body.py`)."""
     arm, time = problem.task.arm, solution.trajectory.time
     dt, nothing = np.diff(time), np.zeros(len(time))
     if arm.base.kind != "floating":

@@ -63,7 +63,7 @@ def between_knots(
 
 @dataclass(frozen=True)
 class Audit:
-    """What samples of a motion keep: errors [m, rad], excess of limits and, by kind, the sample and joint of the worst."""
+    """What samples of a motion keep: errors [m, rad], excess of limits and, by kind, sample and joint of the worst."""
 
     tracking_error: float
     orientation_error: float

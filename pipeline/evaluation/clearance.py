@@ -24,7 +24,7 @@ from pipeline.robot.shapes import Shape
 
 
 class Clearance:
-    """The smallest signed distance [m] between a moving link and an obstacle; between links themselves nothing counts."""
+    """The smallest signed distance [m] between a moving link and an obstacle; between links themselves none counts."""
 
     def __init__(self, arm: Arm, obstacles: Obstacles | None) -> None:
         builder = DiagramBuilder()
@@ -55,7 +55,7 @@ class Clearance:
         return self._plant.RegisterCollisionGeometry(body, pose, kind(*shape.size), name, CoulombFriction())
 
     def __call__(self, q: Array) -> Array:
-        """The distances (K,) at q (K, n): infinite where there is nothing to keep clear of, nan where q is not finite."""
+        """The distances (K,) at q (K, n): infinite if there is nothing to keep clear of, nan where q is not finite."""
         return np.array([self._smallest(one) if np.all(np.isfinite(one)) else np.nan for one in q])
 
     def _smallest(self, q: Array) -> float:

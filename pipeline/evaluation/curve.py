@@ -20,8 +20,8 @@ SAFETY = (1.5, 5.0)  # on the measured error: for at most twice the knots, and f
 
 
 def curve(problem: Problem, time: Array, q: Array) -> CubicSpline:
-    """The C2 spline through the joints' knots q (N + 1, joints): from rest to rest for a path at rest, periodic up to full
-    turns for a cycle.
+    """The C2 spline through the joints' knots q (N + 1, joints): from rest to rest for a path at rest, periodic up to
+    full turns for a cycle.
     """
     if problem.boundary is Boundary.CYCLIC and (winding := turns_of_cycle(problem, q)) is not None:
         rate = winding / (time[-1] - time[0])
@@ -58,7 +58,7 @@ class OffPath:
 
     distance: float
     angle: float
-    at: tuple[float, float]
+    when: tuple[float, float]
 
 
 def off_path(problem: Problem, plant: SinglePlant, time: Array, q: Array) -> OffPath:
@@ -77,7 +77,7 @@ def off_path(problem: Problem, plant: SinglePlant, time: Array, q: Array) -> Off
 
 
 def steps_needed(problem: Problem, time: Array, off: float, allowed: float) -> int | None:
-    """How many even intervals would bring a curve that is `off` [m] its path on the knots `time` to within `allowed`.
+    """How many even intervals would bring a curve, `off` [m] its path on the knots `time`, to within `allowed`.
 
     The path itself, splined through its points at the knots, shows how that error falls with their number (as its fourth
     power, once they resolve it); the curve's is larger by a factor, measured on the knots it has, which tells less the
@@ -90,7 +90,7 @@ def steps_needed(problem: Problem, time: Array, off: float, allowed: float) -> i
 
 
 def _least(problem: Problem, low: int, allowed: float) -> int | None:
-    """The number of intervals, rounded up to two digits, on which the path's own spline is within `allowed` [m] of it."""
+    """The intervals, rounded up to two digits, on which the path's own spline is within `allowed` [m] of it."""
     high = MOST
     if not _of_path(problem, high) <= allowed:
         return None

@@ -9,6 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import pandas as pd
+from scipy.spatial.transform import Rotation
 
 from pipeline.common.arrays import Array
 from pipeline.evaluation.base import BaseMotion, angle_between, base_motion, entered_cycle
@@ -87,6 +89,21 @@ class Evaluation:
     def integral(self, name: str) -> float:
         """One of them at the end of the motion."""
         return float(self.integrals[name][-1])
+
+    def to_frame(self) -> pd.DataFrame:
+        """A row per knot: time [s], q_1..n [rad or m], qd_1.., qdd_1.., tau_1.. [N m or N], the effector's x, y, z [m].
+
+        Of a floating base also its position base_x, .. [m] and its rotation vector base_rx, .. [rad] in the world.
+        """
+        columns: dict[str, Array] = {"time": self.time}
+        for name, values in (("q", self.q), ("qd", self.qd), ("qdd", self.qdd), ("tau", self.tau)):
+            columns |= {f"{name}_{j + 1}": values[:, j] for j in range(values.shape[1])}
+        columns |= dict(zip("xyz", self.position.T, strict=True))
+        if self.base.reaction is None:
+            turned = Rotation.from_matrix(self.base.rotation).as_rotvec()
+            columns |= {f"base_{axis}": column for axis, column in zip("xyz", self.base.position.T, strict=True)}
+            columns |= {f"base_r{axis}": column for axis, column in zip("xyz", turned.T, strict=True)}
+        return pd.DataFrame(columns)
 
     @property
     def confirmed(self) -> bool:
@@ -188,7 +205,8 @@ def _judge(
         worst = int(np.argmax(error))
         if error[worst] > solution.tracking_tolerance:
             return Status.UNCONFIRMED, (
-                f"the end effector is {error[worst]:.2e} {unit} off its path at t = {solution.trajectory.time[worst]:.2f} s; "
+                f"the end effector is {error[worst]:.2e} {unit} off its path at "
+                f"t = {solution.trajectory.time[worst]:.2f} s; "
                 f"{solution.method} promises {solution.tracking_tolerance:.0e} {unit}"
             )
     for kind in solution.limits_kept:
@@ -205,9 +223,9 @@ def _judge_between(
     """
     message = solution.message
     reference, time, arm = problem.reference, solution.trajectory.time, problem.task.arm
-    for error, own, allowed, unit, key, at in (
-        (off.distance, tracking, reference.tolerance, "m", "tolerance", off.at[0]),
-        (off.angle, turned, reference.orientation_tolerance, "rad", "orientation_tolerance", off.at[1]),
+    for error, own, allowed, unit, key, moment in (
+        (off.distance, tracking, reference.tolerance, "m", "tolerance", off.when[0]),
+        (off.angle, turned, reference.orientation_tolerance, "rad", "orientation_tolerance", off.when[1]),
     ):
         if error > allowed and not message:
             promise = (
@@ -216,8 +234,8 @@ def _judge_between(
             message = f"{solution.method} is up to {error:.2g} {unit} off its path, {promise}"
         if error > own.max() + allowed and not solution.knots_only:
             return Status.UNCONFIRMED, (
-                f"between its knots the motion is up to {error:.2g} {unit} off its path (at t = {at:.3g} s), more than "
-                f"path.{key} = {allowed:g} {unit}; {_advice(problem, time, error, allowed)}"
+                f"between its knots the motion is up to {error:.2g} {unit} off its path (at t = {moment:.3g} s), "
+                f"more than path.{key} = {allowed:g} {unit}; {_advice(problem, time, error, allowed)}"
             )
     turns = (
         turns_of_cycle(problem, solution.trajectory.q[:, arm.joints]) if problem.boundary is Boundary.CYCLIC else None

@@ -1,4 +1,4 @@
-"""What a base does and feels, from a plant that shares nothing with the solver's: Drake's own free body with a quaternion.
+"""What a base does and feels, from a plant that shares nothing with the solver's: Drake's free body with a quaternion.
 
 Where the base floats, its motion is found again from the joint motion alone: the cubic spline through the joints' knots
 drives it, and the momentum equation M_bb V = p - M_bm qd_m is integrated by RK4. Momentum is then computed from that
@@ -34,7 +34,8 @@ class FreeMotion:
     """A floating base's motion, integrated at times (S,) [s]: position (S, 3) [m] and rotation of the root link.
 
     linear, angular: the largest error of the system's momentum between those times, relative to the largest momentum
-    that the moving arm has of its own (with the base at rest). path_error [m]: the end effector's distance from its path.
+    that the moving arm has of its own (with the base at rest). path_error [m]: the end effector's distance from its
+    path.
     """
 
     time: Array
@@ -46,7 +47,7 @@ class FreeMotion:
 
 
 class BasePlant:
-    """The arm and its spacecraft as one free body with joints; velocities are [w, v of the root link's origin, qd_m]."""
+    """The arm and its spacecraft as one free body with joints; velocities: [w, v of the root link's origin, qd_m]."""
 
     def __init__(self, arm: Arm) -> None:
         fixed, plant, craft = arm.on_fixed_base.description, MultibodyPlant(0.0), arm.base.spacecraft
@@ -103,7 +104,7 @@ class BasePlant:
 
 
 def reactions(arm: Arm, q: Array, qd: Array, qdd: Array) -> Array:
-    """Forces and torques (K, 6) that hold the base still under a motion of the joints (K, n); nan where that is not finite."""
+    """Forces and torques (K, 6) that hold the base still while the joints move (K, n); nan where that is not finite."""
     plant, out = BasePlant(arm), np.full((len(q), 6), np.nan)
     for i in np.flatnonzero(np.isfinite(np.hstack([q, qd, qdd])).all(axis=1)):
         out[i] = plant.reaction(q[i], qd[i], qdd[i])
@@ -151,7 +152,7 @@ def integrate(problem: Problem, time: Array, q: Array) -> FreeMotion:
 def _check(
     problem: Problem, plant: BasePlant, time: Array, position: Array, quaternion: Array, joints: Any, momentum: Array
 ) -> FreeMotion:
-    """The momentum of the integrated motion half-way between its steps, from splines through it; continuous quaternions."""
+    """The momentum of the integrated motion midway between its steps, by splines; continuous quaternions."""
     moved, turned = CubicSpline(time, position), CubicSpline(time, quaternion)
     middle = (time[1:] + time[:-1]) / 2
     places, ways, q, qd = moved(middle), turned(middle), joints(middle), joints(middle, 1)

@@ -13,8 +13,8 @@ LIMITS = 1e-6  # relative: how well a method that promises limits must keep them
 def limit_excess(
     problem: Problem, q: Array, qd: Array, tau: Array, clearance: float = np.inf, turn: float = 0.0
 ) -> dict[str, float]:
-    """By how much each kind of limit is exceeded, relative to its size (positions: to half the range; clearances: to the
-    margin); <= 0 if kept. turn [rad]: of the base from its start.
+    """By how much each kind of limit is exceeded, relative to its size (positions: to half the range; clearances: to
+    the margin); <= 0 if kept. turn [rad]: of the base from its start.
     """
     if not problem.constrained or not np.all(np.isfinite(q)):
         return {}

@@ -1,7 +1,7 @@
 """One arm in a plant of its own, evaluated knot by knot through Drake's own energy, torque and pose calls.
 
-It shares nothing with the stacked plants and the scaling of the solvers (`pipeline.model`, `pipeline.program`): what the
-evaluation says of a motion comes from here.
+It shares nothing with the stacked plants and the scaling of the solvers (`pipeline.model`, `pipeline.program`): what
+the evaluation says of a motion comes from here.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from pipeline.robot.mounting import Mounting
 
 @dataclass(frozen=True)
 class Parts:
-    """What `add_arm` has added: Drake's model, the frame of its root, the end-effector frame, and its joints in order."""
+    """What `add_arm` has added: Drake's model, the frame of its root, the end-effector frame, its joints in order."""
 
     model: Any
     root: Any
@@ -113,7 +113,7 @@ class SinglePlant:
         return float((self.root.EvalSpatialVelocityInWorld(self.context).rotational() ** 2).sum())
 
     def motion_map(self) -> Array:
-        """All velocities by the joints' (N, n): [-M_bb^-1 M_bm; I] on a base that floats, [0; I] on one that stands still."""
+        """All velocities by the joints' (N, n): [-M_bb^-1 M_bm; I] if the base floats, [0; I] if it stands still."""
         n, nb = len(self.order), self.nb
         out = np.vstack([np.zeros((nb, n - nb)), np.eye(n - nb)])
         if self.arm.base.kind == "floating":

@@ -1,4 +1,4 @@
-"""Velocities, accelerations and running integrals by the documents' backward differences (Global paper eqs (3) to (6))."""
+"""Velocities, accelerations, running integrals by the documents' backward differences (Global paper eqs (3) to (6))."""
 
 from __future__ import annotations
 

@@ -2,10 +2,11 @@
 
 Every knot's manifold is sampled evenly in arc length (all loops: `self_motion.py`), and Bellman's recursion
 V_i(b) = min_a V_(i-1)(a) + 1/2 d' M(q_b) d / dt_i, with d = q_b - q_a the joint difference of one interval, runs over
-all pairs of nodes, so that it needs no assumption on how the manifold changes along the path (other terms of first order:
-`manifold_grid.py`). The sum is the kinetic-energy integral by backward differences (PMKE paper eq. (4), Global paper eq. (5)). Every path of the grid keeps
-the task at its knots and is feasible for the transcription on the same knots: the cost bounds that program's optimum
-from above, and its excess, the grid error, is of second order in the node spacing.
+all pairs of nodes, so that it needs no assumption on how the manifold changes along the path (other terms of first
+order: `manifold_grid.py`). The sum is the kinetic-energy integral by backward differences (PMKE paper eq. (4), Global
+paper eq. (5)). Every path of the grid keeps the task at its knots and is feasible for the transcription on the same
+knots: the cost bounds that program's optimum from above, and its excess, the grid error, is of second order in the
+node spacing.
 """
 
 from __future__ import annotations
@@ -81,7 +82,7 @@ def starts(problem: Problem, times: Array, nodes: int = 180, same_path: float = 
 
 
 def _distinct(problem: Problem, motions: Array, costs: Array, same_path: float) -> list[int]:
-    """Indices of distinct motions of finite cost, best first; they are shifted by full turns into the limits in place."""
+    """Indices of distinct motions of finite cost, best first; shifted in place by full turns into the limits."""
     revolute, bounds = problem.task.arm.description.revolute, problem.bounds
     turns = np.where(revolute & np.isfinite(bounds.lower), 2 * np.pi, 0.0)
     lowest = motions.min(axis=1) - bounds.lower
@@ -121,7 +122,7 @@ def _intervals(problem: Problem, intervals: int | None) -> Array:
 
 
 def forward(grid: Grid, start: Array) -> tuple[Array, list[Index]]:
-    """From values (K_0,) at the first knot: values (K_N,) at the last and the best predecessors, one array per interval."""
+    """From values (K_0,) at the first knot: values (K_N,) at the last and the best predecessors of every interval."""
     value = start
     best: list[Index] = []
     for i in range(len(grid.layers) - 1):

@@ -1,7 +1,7 @@
 """The velocity-level baselines, integrated in time: least joint velocities and least instantaneous kinetic energy.
 
-`lsv`: qd = J+ xd, least squares (PMKE paper eq. (2), qd_0 = 0). The paper prints J+ = (J'J)^-1 J'; the right inverse of a
-wide Jacobian is J+ = J'(J J')^-1, which is used here.
+`lsv`: qd = J+ xd, least squares (PMKE paper eq. (2), qd_0 = 0). The paper prints J+ = (J'J)^-1 J'; the right inverse
+of a wide Jacobian is J+ = J'(J J')^-1, which is used here.
 `inertia_weighted`: qd = M^-1 J'(J M^-1 J')^-1 xd, least qd'M qd at every instant (Whitney 1969; Global paper eq. (10)).
 On a floating base J is the generalized Jacobian and M the reduced inertia (`floating.py`).
 """
@@ -20,7 +20,7 @@ from pipeline.problem.solution import Solution, Trajectory
 
 
 def solve(problem: Problem, options: LsvOptions, context: Context) -> list[Solution]:
-    """Integrate the least-squares velocities from q_init; a singular configuration on the way is reported with its time."""
+    """Integrate the least-squares velocities from q_init; a singular configuration on the way is told with its time."""
     return [_integrate("lsv", problem, options, weighted=False)]
 
 

@@ -34,7 +34,7 @@ class Serves:
     moving_base: bool = True
 
     def why_not(self, problem: Problem) -> str | None:
-        """The first condition that `problem` does not meet, and what is supported, without a full stop; None: served."""
+        """The first condition that `problem` does not meet and what is supported, without full stop; None if served."""
         why = self._unmet(problem)
         return _contradiction(problem) if why is None else f"{why}; supported {self}"
 
@@ -95,6 +95,11 @@ class Context:
     seed: int = 1
     workers: Workers = field(default_factory=Workers)
     progress: Progress = no_progress
+
+
+@dataclass(frozen=True)
+class NoOptions:
+    """Of a method that has none."""
 
 
 Solve = Callable[[Problem, Any, Context], list[Solution]]

@@ -43,7 +43,7 @@ IMPROVED = 1e-7  # relative: a smaller gain is none
 
 @dataclass(frozen=True)
 class Point:
-    """One program of the front: minimise `weights`, with the integral `bounded` at most `bound`; its best motion so far."""
+    """One program of the front: minimise `weights`, the integral `bounded` at most `bound`; its best motion so far."""
 
     direction: str  # minimise:<integral>, or weights
     weights: tuple[float, float]
@@ -60,7 +60,7 @@ class Point:
 
 
 def solve(problem: Problem, options: ParetoOptions, context: Context) -> list[Solution]:
-    """The front's motions, from the first extreme to the second. The first's statistics hold `front`, a row per point."""
+    """The front's motions, from one extreme to the other. The first's statistics hold `front`, a row per point."""
     first, second = options.objectives
     known: list[Array] = []
     found: dict[str, Point] = {}

@@ -26,8 +26,8 @@ from pipeline.robot.mounting import Mounting
 class Arm:
     """A serial arm, mounted on a base, and its end-effector frame.
 
-    `description` comes from `pipeline.robot.urdf.read`. Its n coordinates are those of the base, of which a fixed one has
-    none, and behind them the joints: q[:, arm.joints]. `arm.description` names all of them.
+    `description` comes from `pipeline.robot.urdf.read`. Its n coordinates are those of the base, of which a fixed one
+    has none, and behind them the joints: q[:, arm.joints]. `arm.description` names all of them.
     """
 
     def __init__(self, description: Description, mounting: Mounting = Mounting(), base: Base = FIXED) -> None:
@@ -123,7 +123,7 @@ class Arm:
         return self._map(one, q, qd)
 
     def spatial_jacobian(self, q: Array) -> Array:
-        """Angular and translational Jacobians (K, 6, n) of the end effector in the world [rad/rad, m/rad], in that order."""
+        """Angular, then translational Jacobians (K, 6, n) of the end effector in the world [rad/rad, m/rad]."""
 
         def one(stack: Stack, q: Array) -> Array:
             stack.at(q)

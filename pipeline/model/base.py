@@ -46,7 +46,7 @@ class Base(Protocol):
 
     @property
     def kind(self) -> Literal["fixed", "held", "floating"]:
-        """fixed: it has no coordinates. held: it has, and stands still. floating: it is free, without forces from outside."""
+        """fixed: it has no coordinates. held: it has, and stands still. floating: free, without forces from outside."""
 
     @property
     def count(self) -> int:
@@ -58,7 +58,7 @@ class Base(Protocol):
 
     @property
     def spacecraft(self) -> Spacecraft:
-        """The body that is bolted to the root link, and the momentum of the whole system; without mass if there is none."""
+        """The body that is bolted to the root link, and the momentum of the whole system; no mass if there is none."""
 
     def extend(self, description: Description) -> Description:
         """The description with the base's coordinates before the joints."""

@@ -85,7 +85,7 @@ class Clearance:
 
 
 class Rows:
-    """Drake's smooth penalty of the closest pairs: at most 1 where all keep their distance, with its exact derivative."""
+    """Drake's smooth penalty of the closest pairs: at most 1 where all keep their distance; its exact derivative."""
 
     UPPER = 1.0
 

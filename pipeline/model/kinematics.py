@@ -80,10 +80,11 @@ def project(
 
 
 def place(task: Task, q_init: Array, start: Array) -> Array:
-    """The configuration near q_init (n,) whose end effector is at the target `start`; raises PathError if there is none."""
+    """The configuration near q_init (n,) whose end effector is at the target `start`; PathError if there is none."""
     q, error = project(task, q_init[None], start[None])
     if error[0] > 1e-10:
         raise PathError(
-            f"the path's start ({', '.join(f'{v:.4g}' for v in start[: len(task.axes)])}) m is out of reach: the arm comes within {error[0]:.3g} m of it from robot.q_init"
+            f"the path's start ({', '.join(f'{v:.4g}' for v in start[: len(task.axes)])}) m is out of reach: "
+            f"the arm comes within {error[0]:.3g} m of it from robot.q_init"
         )
     return q[0]

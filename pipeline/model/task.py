@@ -1,7 +1,7 @@
 """What the end effector must do: the target that it is given, the error from it, and Jacobians, for stacked q.
 
 A target is a row of task coordinates: the prescribed world coordinates [m], and for a pose the rotation vector of the
-end effector's frame in the world [rad] behind them. Velocities and accelerations of a target are those coordinates', and
+end effector's frame in the world [rad] behind them. Velocities and accelerations of a target are the coordinates', and
 the angular ones in the world. Errors and Jacobians have m rows; the angular ones are taken in the end effector's frame,
 in which they do not depend on the target. Orientation errors are rotation logarithms (Murray, Li and Sastry 1994, 2.2).
 """
@@ -96,7 +96,7 @@ class PositionTask:
 
 @dataclass(frozen=True)
 class PoseTask:
-    """Prescribe the position and the orientation of the end effector (m = 6), or where its axis `pointing` points (m = 5).
+    """Prescribe the position and orientation of the end effector (m = 6), or where its axis `pointing` points (m = 5).
 
     pointing: (3,) axis in the end effector's frame, about which it may spin; None: the whole orientation is prescribed.
     """
@@ -143,17 +143,17 @@ class PoseTask:
     def error(self, q: Array, target: Array) -> Array:
         """[x(q) - x_ref; rotation from the target's orientation] (K, m) [m, rad]."""
         position, rotation = self.arm.pose(q)
-        return np.hstack([position - target[:, :3], self._turn(rotation, target)[0]])
+        return np.hstack([position - target[:, :3], self.turn(rotation, target)[0]])
 
     def error_and_jacobian(self, q: Array, target: Array) -> tuple[Array, Array]:
         """The error (K, m) and its derivative by q (K, m, n), which is J on the target."""
         position, rotation, both = self.arm.pose_and_jacobian(q)
-        turn, by_angular = self._turn(rotation, target)
+        turn, by_angular = self.turn(rotation, target)
         angular = by_angular @ rotation.swapaxes(1, 2) @ both[:, :3]
         return np.hstack([position - target[:, :3], turn]), np.concatenate([both[:, 3:], angular], axis=1)
 
     def jacobian_and_gradient(self, q: Array) -> tuple[Array, Array]:
-        """J (K, m, n) and d J_ij / d q_k (K, m, n, n): in its own frame a joint's angular velocity is turned by later ones."""
+        """J (K, m, n), d J_ij / d q_k (K, m, n, n): later joints turn a joint's angular velocity in this frame."""
         linear, by_q = self.arm.jacobian_and_gradient(q)
         rotation, both = self.arm.pose_and_jacobian(q)[1:]
         own = rotation.swapaxes(1, 2) @ both[:, :3]
@@ -186,7 +186,7 @@ class PoseTask:
         return np.hstack([target_acceleration[:, :3], self._own(rotation, angular)])
 
     def apart(self, first: Array, second: Array) -> tuple[float, float]:
-        """How far two targets (6,) are from each other, [m] and [rad]: the angle of R0' R1, or that between the axes."""
+        """How far two targets (6,) are from each other, [m] and [rad]: the angle of R0' R1, or between the axes."""
         pair = np.array([first, second])
         rotation = Rotation.from_rotvec(pair[:1, 3:]).as_matrix()
         return float(np.linalg.norm(second[:3] - first[:3])), float(np.linalg.norm(self._turn(rotation, pair[1:])[0]))
@@ -201,8 +201,8 @@ class PoseTask:
     def _rows(self, rotation: Array, both: Array) -> Array:
         return np.concatenate([both[:, 3:], self.basis @ rotation.swapaxes(1, 2) @ both[:, :3]], axis=1)
 
-    def _turn(self, rotation: Array, target: Array) -> tuple[Array, Array]:
-        """The orientation error (K, 3 or 2) [rad] and its derivative (K, 3 or 2, 3) by a turn in the effector's frame."""
+    def turn(self, rotation: Array, target: Array) -> tuple[Array, Array]:
+        """Orientation error (K, 3 or 2) [rad] and its derivative (K, 3 or 2, 3) by a turn in the effector's frame."""
         wanted = Rotation.from_rotvec(target[:, 3:]).as_matrix()
         if self.pointing is None:
             return _logarithm(wanted.swapaxes(1, 2) @ rotation)
@@ -233,8 +233,8 @@ def _logarithm(rotation: Array) -> tuple[Array, Array]:
 
 
 def _swing(seen: Array, axis: Array, basis: Array) -> tuple[Array, Array]:
-    """How far the axis is from the direction `seen` (K, 3) that it should have, both in the effector's frame: the smallest
-    turn between them, by `basis` (K, 2) [rad], and its derivative (K, 2, 3) by a turn of that frame.
+    """How far the axis is from the direction `seen` (K, 3) that it should have, both in the effector's frame: the
+    smallest turn between them, by `basis` (K, 2) [rad], and its derivative (K, 2, 3) by a turn of that frame.
     """
     sine, cosine = np.linalg.norm(np.cross(seen, axis), axis=1), seen @ axis
     angle = np.arctan2(sine, cosine)

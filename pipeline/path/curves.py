@@ -1,4 +1,4 @@
-"""The prescribed path: its geometry and orientation by arc length, its timing law s(t), and the reference that they make.
+"""The prescribed path: its geometry and orientation by arc length, its timing law s(t), and the reference they make.
 
 Points are in task coordinates (2 for a planar task, 3 in space) [m]; s is arc length [m]; t is time [s].
 """

@@ -22,7 +22,7 @@ class Orientation:
         self._spline = None if self._still else RotationSpline(self.marks, rotations)
 
     def sample(self, s: Array) -> tuple[Array, Array, Array]:
-        """Rotation vector [rad], angular velocity dphi/ds [rad/m] and its derivative by s, all in the world, each (K, 3)."""
+        """Rotation vector [rad], angular velocity dphi/ds [rad/m], its derivative by s: in the world, each (K, 3)."""
         if self._spline is None:
             still = np.zeros((len(s), 3))
             return still + self.rotations[0].as_rotvec(), still, still

@@ -32,7 +32,7 @@ class Reference:
         return self.timing.duration
 
     def sample(self, t: Array) -> tuple[Array, Array, Array]:
-        """Targets, their velocities and accelerations at times t (K,), each (K, m), or (K, 6) for poses (see task.py)."""
+        """Targets, their velocities and accelerations at times t (K,): each (K, m), or (K, 6) for poses (task.py)."""
         s, sd, sdd = self.timing.sample(np.asarray(t, dtype=float), self.geometry.length)
         x, tangent, curvature = self.geometry.sample(s)
         if self.orientation is not None:

@@ -21,7 +21,7 @@ FINE = 33  # samples between two way-points
 
 @dataclass(frozen=True)
 class Through:
-    """A path through way-points: the curve, its orientations or None, and by way-point (P,) where along it that lies [m].
+    """A path through way-points: the curve, its orientations or None, and where along it each way-point lies (P,) [m].
 
     stops: indices of way-points between the first and the last at which the path comes to rest.
     departure: the largest distance [m] of the curve from the way-points' polygon, and the way-point before it, from 1.
@@ -37,8 +37,8 @@ class Through:
 def through(points: Array, rotations: Rotation | None, *, rest: bool = False) -> Through:
     """The path through points (P, m) [m] and rotations (P); equal neighbours are a dwell, of length zero.
 
-    It comes to rest where it turns back, before and after it turns on the spot, and with `rest` at every corner, so that
-    it is straight in between; elsewhere it is smooth.
+    It comes to rest where it turns back, before and after it turns on the spot, and with `rest` at every corner, so
+    that it is straight in between; elsewhere it is smooth.
     """
     moves, turns = steps(points, rotations)
     kept = np.concatenate([[0], 1 + np.flatnonzero((moves > SAME) | (turns > SAME))])

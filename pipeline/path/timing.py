@@ -78,8 +78,8 @@ class Quintic:
 
 @dataclass(frozen=True)
 class WithStops:
-    """A law from rest to rest between each stop and the next: the time is shared out by length, so that the same speed is
-    reached in all parts. stops: fractions of the length, increasing, from 0 to 1.
+    """A law from rest to rest between each stop and the next: the time is shared out by length, so that the same speed
+    is reached in all parts. stops: fractions of the length, increasing, from 0 to 1.
     """
 
     law: Callable[[float], Timing]
@@ -101,10 +101,10 @@ class WithStops:
 
 @dataclass(frozen=True)
 class Stamped:
-    """The fractions (P,) of the length at the times (P,) [s], from 0 on: rest to rest, and at rest in `stops` (indices).
+    """The fractions (P,) of the length at times (P,) [s], from 0 on: rest to rest, and at rest in `stops` (indices).
 
-    Quintics with continuous acceleration, which is zero at the time stamps. The speed there is the harmonic mean of the
-    mean speeds before and after (Fritsch and Butland 1984), at most 5/4 of either: then the differences of Bezier points,
+    Quintics with continuous acceleration, which is zero at the time stamps. The speed there is the harmonic mean of
+    the mean speeds before and after (Fritsch and Butland 1984), at most 5/4 of either: then the differences of Bezier points,
     5 d0, 5 d0, 25 v - 10 (d0 + d1), 5 d1, 5 d1 with mean speed v, are not negative, and no quintic runs backwards.
     """
 

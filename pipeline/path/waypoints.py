@@ -43,8 +43,8 @@ def same_point(row: int) -> str:
 
 
 def read(file: str | File, axes: Sequence[str]) -> Waypoints:
-    """The rows of a CSV file with a column [m] for each of `axes`; it may have roll, pitch, yaw [rad] or qx, qy, qz, qw,
-    and time [s]. Raises PathError, one line, for anything else that it holds.
+    """The rows of a CSV file with a column [m] for each of `axes`; it may have roll, pitch, yaw [rad] or qx, qy, qz,
+    qw, and time [s]. Raises PathError, one line, for anything else that it holds.
     """
     table = _table(File(file))
     _check_header(file, [str(name) for name in table.columns], axes)
@@ -90,15 +90,16 @@ def _check_header(file: str | File, header: Sequence[str], axes: Sequence[str]) 
     both = [any(name in header for name in kind) for kind in (ROLL_PITCH_YAW, QUATERNION)]
     if all(both):
         raise PathError(
-            f"path.file = {file}: orientations of two kinds, {', '.join(ROLL_PITCH_YAW)} and {', '.join(QUATERNION)}; one is enough"
+            f"path.file = {file}: orientations of two kinds, {', '.join(ROLL_PITCH_YAW)} and {', '.join(QUATERNION)}; "
+            "one is enough"
         )
     for kind, there in zip((ROLL_PITCH_YAW, QUATERNION), both, strict=True):
         lacking = [name for name in kind if name not in header]
         if there and lacking:
             only = ", ".join(name for name in kind if name in header)
             raise PathError(
-                f"path.file = {file}: an orientation needs the columns {', '.join(kind)}; the header has {only}, and no "
-                f"{', '.join(lacking)}"
+                f"path.file = {file}: an orientation needs the columns {', '.join(kind)}; the header has {only}, and "
+                f"no {', '.join(lacking)}"
             )
     known = (*axes, *ROLL_PITCH_YAW, *QUATERNION, TIME)
     unknown = [name for name in header if name not in known]
@@ -106,8 +107,8 @@ def _check_header(file: str | File, header: Sequence[str], axes: Sequence[str]) 
         close = difflib.get_close_matches(unknown[0].lower(), known, n=1, cutoff=0.75)
         hint = f"did you mean {close[0]}? " if close else ""
         raise PathError(
-            f"path.file = {file}: column{'s' * (len(unknown) > 1)} {', '.join(name or '(no name)' for name in unknown)} not "
-            f"understood; {hint}needed are {', '.join(axes)}; beside them there may be {', '.join(ROLL_PITCH_YAW)} or "
+            f"path.file = {file}: column{'s' * (len(unknown) > 1)} {', '.join(name or '(no name)' for name in unknown)} "
+            f"not understood; {hint}needed are {', '.join(axes)}; beside them there may be {', '.join(ROLL_PITCH_YAW)} or "
             f"{', '.join(QUATERNION)}, and {TIME}"
         )
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.common.arrays import Array
+from pipeline.model.arm import Arm
 
 LIMIT_KINDS = ("position", "velocity", "torque", "power", "clearance", "attitude")
 
@@ -34,6 +35,13 @@ class Limits:
         )
 
     @classmethod
+    def of(cls, arm: Arm) -> Limits:
+        """Those of the arm's description: positions, velocities and efforts; powers have none there."""
+        own, free = arm.description, np.full(arm.n, np.inf)
+        return cls(own.lower.copy(), own.upper.copy(), own.velocity.copy(), own.effort.copy(), free)
+
+    @classmethod
     def none(cls, n: int) -> Limits:
+        """No limits on n joints."""
         free = np.full(n, np.inf)
         return cls(-free, free, free, free, free)

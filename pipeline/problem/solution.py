@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from pipeline.common.arrays import Array
 
@@ -58,6 +59,11 @@ class Solution:
     found: bool = True
     knots_only: bool = False
     statistics: dict[str, Any] = field(default_factory=dict)
+
+    def to_frame(self) -> pd.DataFrame:
+        """The motion as a table of N + 1 rows: time [s], all coordinates q_1..n [rad or m], a moving base's first."""
+        q = self.trajectory.q
+        return pd.DataFrame({"time": self.trajectory.time, **{f"q_{j + 1}": q[:, j] for j in range(q.shape[1])}})
 
 
 def no_progress(done: int, total: int, best: float) -> None:

@@ -11,11 +11,12 @@ from collections.abc import Sequence
 
 MODULE = r"^\s*\S*python[\d.]*\s+-m\s+(pipeline[\w.]*)"
 
-# The whole line goes to Hydra; what begins with an underscore is only there to be inherited from. Where the shell breaks
-# words at `=` it replaces only what stands behind it.
+# The whole line goes to Hydra; what begins with an underscore is only there to be inherited from. Where the shell
+# breaks words at `=` it replaces only what stands behind it.
 BASH = r"""_pipeline_completion() {
     local line=${COMP_LINE:0:COMP_POINT} word command
-    if [[ $line =~ ^[[:space:]]*([^[:space:]]*python[0-9.]*[[:space:]]+-m[[:space:]]+pipeline[a-z.]*|[^[:space:]]*selfmotion)[[:space:]] ]]; then
+    local module='[^[:space:]]*python[0-9.]*[[:space:]]+-m[[:space:]]+pipeline[a-z.]*'
+    if [[ $line =~ ^[[:space:]]*($module|[^[:space:]]*selfmotion)[[:space:]] ]]; then
         command=${BASH_REMATCH[1]}
     else
         return

@@ -23,7 +23,7 @@ GROUP = r"\+?[a-z_/]+=[\w,]+"  # a word that may pick an option
 
 
 def refuse(words: Sequence[str]) -> None:
-    """Raise ConfigError for what Hydra takes without a word: a deleted option, or one only there to be inherited from."""
+    """Raise ConfigError for what Hydra takes silently: a deleted option, or one only there to be inherited from."""
     for word in words:
         if word.startswith("~") and _deletes_an_option(word):
             raise ConfigError(f"{word}: options cannot be deleted, only entries of tables; give it another value")

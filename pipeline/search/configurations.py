@@ -32,7 +32,7 @@ KINDS = ("normal", "latin_hypercube", "uniform")
 def random_configurations(
     task: Task, q_init: Array, count: int, rng: np.random.Generator, kind: str = "normal"
 ) -> Array:
-    """Distinct configurations (K, n), K <= count, that hold the task point of q_init (n,); q_init comes first. Any r >= 1.
+    """Distinct configurations (K, n), K <= count, that hold the task point of q_init (n,), the first. Any r >= 1.
 
     `normal`, `latin_hypercube`: self-motions q_init + int_0^1 (I - J+J) qd_p dt with random constant qd_p, of standard
     deviation pi or stratified in (-2 pi, 2 pi) [rad/s] (Global paper eq. (17)); they stay on the component of q_init.

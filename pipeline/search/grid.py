@@ -27,8 +27,8 @@ PAIRS = 2**16  # node pairs per batch: what stays in the processor's cache
 
 @dataclass(frozen=True)
 class Layer:
-    """The nodes of one knot: q (K, n) [rad], L (K, n, n) with G = L L', the gain k0 w (K,), whether they are within limits
-    (K,), loop sizes.
+    """The nodes of one knot: q (K, n) [rad], L (K, n, n) with G = L L', the gain k0 w (K,), whether they are within
+    limits (K,), loop sizes.
     """
 
     q: Array
@@ -99,8 +99,8 @@ def _difference(end: Array, start: Array, turning: bool) -> Array:
 def make_grid(problem: Problem, times: Array, nodes: int, velocity_slack: float = 0.0) -> Grid:
     """Trace the manifolds of all knots `times` (N + 1,) and evaluate M at their nodes, once each, stacked.
 
-    A joint whose position limits leave at most a turn is represented within them and cannot jump across the gap; one that
-    is centred in its range is represented half a turn to either side of the centre.
+    A joint whose position limits leave at most a turn is represented within them and cannot jump across the gap; one
+    that is centred in its range is represented half a turn to either side of the centre.
     """
     task, bounds = problem.task, problem.bounds
     fixed, cyclic = problem.boundary is Boundary.FIXED, problem.boundary is Boundary.CYCLIC

@@ -17,7 +17,7 @@ from pipeline.problem.turns import full_turns
 
 
 def random_inverse_weights(rng: np.random.Generator, count: int, n: int) -> Array:
-    """(count, n, n) inverses of random SPD weights: eigenvalues of W uniform in (0, 1], eigenvectors uniform rotations."""
+    """(count, n, n) inverses of random SPD weights: eigenvalues of W in (0, 1] and eigenvectors, both uniform."""
     basis, triangle = np.linalg.qr(rng.normal(size=(count, n, n)))
     basis = basis * np.sign(np.diagonal(triangle, axis1=1, axis2=2))[:, None, :]
     eigenvalues = 1.0 - rng.random((count, n))
@@ -81,7 +81,7 @@ def _close(problem: Problem, times: Array, motions: Array) -> Array:
 
 
 def _refloat(arm: Arm, times: Array, motions: Array) -> Array:
-    """Motions (K, N + 1, n) with the same joints, and the base where they take it; the path is for the solver to find."""
+    """Motions (K, N + 1, n) with the same joints, and the base where they take it; the path is the solver's to find."""
     out = motions.copy()
     for i in range(1, len(times)):
         step = motions[:, i] - motions[:, i - 1]

@@ -36,9 +36,17 @@ def _pick(
     kept: list[int], motions: Array, costs: Array, most: int, apart: float, revolute: NDArray[np.bool_]
 ) -> list[int]:
     kept = list(kept)
+
+    def distance(index: int) -> Array:
+        return np.asarray(np.abs(wrap(motions - motions[index], revolute)).max(axis=(1, 2)))
+
+    nearest = np.full(len(motions), np.inf)  # of those that are kept
+    for index in kept:
+        nearest = np.minimum(nearest, distance(index))
     for index in np.argsort(costs, kind="stable"):
         if len(kept) >= most:
             break
-        if not kept or np.abs(wrap(motions[kept] - motions[index], revolute)).max(axis=(1, 2)).min() > apart:
+        if nearest[index] > apart:
             kept.append(int(index))
+            nearest = np.minimum(nearest, distance(index))
     return kept

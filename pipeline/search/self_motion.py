@@ -52,7 +52,7 @@ class Loop:
     revolute: NDArray[np.bool_]
 
     def interpolate(self, s: Array) -> Array:
-        """Configurations (P, n) at arc lengths s (P,), by cubic Hermite: near the manifold, for a Newton step to finish."""
+        """Configurations (P, n) at arc lengths s (P,), by cubic Hermite: close enough for a Newton step to finish."""
         s = np.mod(s, self.length)
         left = np.clip(np.searchsorted(self.s, s, side="right") - 1, 0, len(self.s) - 1)
         right = (left + 1) % len(self.s)
@@ -298,5 +298,5 @@ def least_move(jacobian: Array, gap: Array) -> Array:
 
 
 def _hermite(u: Array, chord: Array, left: Array, right: Array, span: Array) -> Array:
-    """Displacement (P, n) from the left end at fraction u (P, 1) of a cubic with these end slopes over `span` (P, 1)."""
+    """Displacement (P, n) from the left end at fraction u (P, 1) of a cubic with these slopes over `span` (P, 1)."""
     return u * u * (3 - 2 * u) * chord + span * u * (1 - u) * ((1 - u) * left - u * right)

@@ -44,7 +44,7 @@ from pipeline.robot.description import Description
 from pipeline.studies import style
 from pipeline.studies.study import Motions, Result
 
-FEW = GlobalOptions(candidates=200, optimised=12)  # starts that find every optimum that is printed
+FEW = GlobalOptions(starts="population", solver="ipopt", coarse_steps=12, candidates=200, optimised=12)
 ROUNDS = 5  # of fits, at most, each from the optima at the masses of the one before
 SETTLED = 1e-4  # relative: masses that change less are found
 STEP = 1e-3  # relative, of the differences by the masses

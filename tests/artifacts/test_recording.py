@@ -10,7 +10,6 @@ import signal
 import socket
 import subprocess
 import sys
-import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -38,6 +37,7 @@ from pipeline.robot import urdf
 from pipeline.robot.shapes import Shape, capsule
 from pipeline.studies import style
 from tests.support import ROOT
+from tests.tasks import HUNG, wait_until
 
 ROBOT = ROOT / "robots" / "planar3r.urdf"
 RERUN = shutil.which("rerun", path=os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")]))
@@ -282,18 +282,17 @@ def viewer() -> Iterator[ViewerClient]:
         command, env=QUIET, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
     )
     try:
-        deadline = time.monotonic() + 30
-        while True:
+
+        def answers() -> bool:
             assert process.poll() is None, f"the viewer ended with {process.returncode}"
             with socket.socket() as probe:
-                if probe.connect_ex(("127.0.0.1", port)) == 0:
-                    break
-            assert time.monotonic() < deadline, "the viewer does not answer"
-            time.sleep(0.1)
+                return probe.connect_ex(("127.0.0.1", port)) == 0
+
+        wait_until(answers)
         yield ViewerClient(f"rerun+http://127.0.0.1:{port}/proxy")
     finally:
         os.killpg(process.pid, signal.SIGTERM)  # the command is a wrapper: the viewer is its child
-        process.wait(10)
+        process.wait(HUNG)
 
 
 @pytest.mark.slow
@@ -306,16 +305,16 @@ def test_the_viewer_shows_everything(
         monkeypatch.setattr(blueprint.rrb, "Tabs", blueprint.rrb.Grid)
     write(tmp_path / "run.rrd", *case)
     viewer.open(str(tmp_path / "run.rrd"))
-    deadline = time.monotonic() + 30
-    while (state := viewer.get_state()).loading or not state.views:
-        assert time.monotonic() < deadline, "the recording does not open"
-        time.sleep(0.1)
+    wait_until(lambda: not (state := viewer.get_state()).loading and bool(state.views))
     viewer.set_time("time", duration=5.0, play_state="paused")
-    picture = b""
-    while (latest := viewer.take_screenshot()) != picture:
-        assert time.monotonic() < deadline, "the picture does not settle"
-        picture = latest
-        time.sleep(0.5)
+    pictures = [b""]
+
+    def settled() -> bool:
+        pictures.append(viewer.take_screenshot())
+        return pictures[-1] == pictures[-2]
+
+    wait_until(settled, pause=0.5)
+    picture = pictures[-1]
     (tmp_path / "screen.png").write_bytes(picture)
     state = viewer.get_state()
     names = [view.name for view in state.views]

@@ -98,7 +98,7 @@ def test_front_of_rotation_against_energy(tmp_path: Path) -> None:
     words = (
         *FEW_STARTS,
         "timing.steps=16",
-        "method.global.optimised=4",
+        "method.global.optimised=2",
         "method.pareto.steps=6",
         "method.pareto.rounds=1",
         "method.pareto.max_iterations=60",

@@ -7,7 +7,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from tests.run.test_main import call, command
+from tests.commands import call, command
 
 pytestmark = pytest.mark.slow
 LSV = {"traj1": 8.81e-4, "traj2": 5.37e-3}

@@ -16,7 +16,7 @@ from scipy.interpolate import CubicSpline
 from pipeline.build.problem import prepare
 from pipeline.config.methods import GlobalOptions, PmkeOptions
 from pipeline.config.run import check
-from pipeline.methods.global_planner.planner import global_planner, refinement
+from pipeline.methods.global_planner.planner import STEPS, global_planner, refinement
 from pipeline.methods.pmke.predictive import pmke
 from pipeline.methods.pmke.window import Window
 from pipeline.problem.lagrangian import Lagrangian
@@ -67,10 +67,10 @@ def predictions(repeats: int = REPEATS) -> None:
 
 
 def fine_solve(repeats: int = REPEATS) -> None:
-    """The last stage of the global planner on trajectory 3: 101 points, 303 parameters, started from the stage before."""
+    """The last stage of the global planner on trajectory 3: 101 points, 303 parameters, from the stage before."""
     problem = prepare(check({}))
     options = GlobalOptions()
-    coarse = refinement(problem.times, options.coarse_steps)[-2]
+    coarse = refinement(problem.times, STEPS)[-2]
     rough = global_planner(prepare(check({"timing": {"steps": len(coarse) - 1}})), options)[0]
     guess = CubicSpline(coarse, rough.trajectory.q)(problem.times)
     arm = peer.PlanarArm.from_urdf(peer.ROBOT)

@@ -70,7 +70,7 @@ class PlanarArm:
 
 
 def kinetic_energy_program(arm: PlanarArm, intervals: int, dt: float, tolerance: float = 1e-8) -> ca.Function:
-    """nlpsol over q_1..q_N (N n,), parameters q_0 and the path (2 N); backward differences, mass matrix at the interval's end."""
+    """nlpsol over q_1..q_N (N n,), parameters q_0 and the path (2 N); backward differences, M at the interval's end."""
     n = len(arm.length)
     state, rate = ca.SX.sym("q", n), ca.SX.sym("qd", n)
     energy = ca.Function("T", [state, rate], [arm.kinetic_energy(state, rate)])
@@ -91,7 +91,7 @@ def solve(program: ca.Function, start: Array, path: Array, guess: Array) -> tupl
 
 @dataclass
 class Program:
-    """min of the integral of T or |tau|^2 over q_0..q_N by backward differences, on even knots, with what limits there are.
+    """min of the integral of T or |tau|^2 over q_0..q_N by backward differences, on even knots, with the limits given.
 
     boundary: free (from rest, q_0 unknown) or cyclic (q_N = q_0, and the velocity before the first knot is the last).
     limits: lower, upper, velocity, torque, power, one (n,) each. options: IPOPT's, without the prefix.

@@ -1,7 +1,8 @@
-"""The global planner's multi-start on the Global paper's simulations beside the same multi-start in CasADi + IPOPT.
+"""Whole plans on the Global paper's simulations beside those of CasADi + IPOPT with exact Hessians, interleaved.
 
 The peer gets the planner's own starts, grids, splines between grids, choice of basins and tolerances; only the solves
-differ. Timed are the solves: not imports, not the drawing of the starts, and not CasADi's construction of its functions.
+differ: ours are batches of Newton's method with IPOPT's confirmation. Timed is processor time, not imports, not the
+drawing of the starts, and not the peer's construction of its functions.
 """
 
 from __future__ import annotations
@@ -9,67 +10,41 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
-from typing import Any
 from unittest import mock
 
 import numpy as np
-from hydra import compose, initialize_config_dir
 
 from pipeline.build.problem import prepare
 from pipeline.common.arrays import Array
-from pipeline.config.compose import checked
 from pipeline.config.methods import GlobalOptions
 from pipeline.methods.global_planner import optimum, planner
+from pipeline.methods.global_planner.batch import Batch
 from pipeline.methods.global_planner.optimum import Optimum
-from pipeline.methods.global_planner.planner import global_planner
 from pipeline.methods.method import Context
 from pipeline.problem.costs import objective_values
 from pipeline.problem.problem import Boundary, Problem
-from pipeline.problem.solution import Status
 from tests.benchmarks import peer
+from tests.support import composed
 
 SIMULATIONS = ("sim1", "sim2", "sim3", "sim4", "sim5")
 CONVERGED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
-HEAD = f"{'planner: the same multi-start':<34} {'ours [s]':>9} {'peer [s]':>9} {'ratio':>7}"
+HEAD = f"{'planner: whole plans':<24} {'ours [ms]':>9} {'peer [ms]':>9} {'ratio':>7} {'starts [ms]':>11}"
+REPEATS = 3
 
 
-@dataclass
-class Side:
-    """One way to solve a program from a guess, and the time that its solves took."""
-
-    optimise: Callable[[Problem, Array, Array, GlobalOptions], Optimum]
-    seconds: float = 0.0
-    starts: list[Optimum] = field(default_factory=list)
-    optima: list[Optimum] = field(default_factory=list)
-
-    def run(self, step: Callable[[Any, Any], Optimum], context: Any, item: Any) -> Optimum:
-        """The planner's own `step`, every solve of it by this side."""
-
-        def timed(*arguments: Any) -> Optimum:
-            begin = time.perf_counter()
-            answer = self.optimise(*arguments)
-            self.seconds += time.perf_counter() - begin
-            return answer
-
-        with mock.patch.object(optimum, "_optimise", timed):
-            return step(context, item)
-
-
-class Peer(Side):
-    """CasADi's side: one program per grid and kind of problem, made when first needed."""
+class Peer:
+    """CasADi's programs, one per grid and kind of problem, made when first needed; that time is not counted."""
 
     def __init__(self) -> None:
-        super().__init__(self._solve)
         self.construction = 0.0
         self.programs: dict[tuple[int, bool, bool], peer.Program] = {}
         self.arm = peer.PlanarArm.from_urdf(peer.ROBOT)
 
     def program(self, problem: Problem, times: Array, options: GlobalOptions) -> peer.Program:
-        limits, torque = problem.bounds, problem.objective.second_order
+        limits, torque = problem.bounds, problem.objective.weight("torque") > 0
         key = (len(times), torque, bool(np.isfinite(limits.torque).any()))
         if key not in self.programs:
-            begin = time.perf_counter()
+            begin = time.process_time()
             self.programs[key] = peer.Program(
                 self.arm,
                 times,
@@ -87,71 +62,85 @@ class Peer(Side):
                     "acceptable_constr_viol_tol": 1e-8,
                 },
             )
-            passed = time.perf_counter() - begin
-            self.construction += passed
-            self.seconds -= passed  # it happens within a timed solve
+            self.construction += time.process_time() - begin
         return self.programs[key]
 
-    def _solve(
+    def optimise(
         self, problem: Problem, times: Array, guess: Array, options: GlobalOptions, keep_off: float = 0.0
     ) -> Optimum:
+        """What `optimum.optimise` does by Drake's IPOPT."""
         assert not keep_off, "the peer knows no obstacles"
         q, cost, statistics = self.program(problem, times, options).solve(guess)
         status = statistics["return_status"]
         return Optimum(q, cost, status in CONVERGED, status)
 
 
+class Plan:
+    """One problem, its starts, and both sides' way from them to all optima."""
+
+    def __init__(self, name: str, *words: str) -> None:
+        config = composed(f"+experiment={name}", *words)
+        self.problem, self.options = prepare(config), config.method.of("global")
+        self.grids = planner.refinement(self.problem.times, self.options.coarse_steps or planner.STEPS)
+        begin = time.process_time()
+        self.motions, _ = planner._starts(self.problem, self.grids[0], self.options, np.random.default_rng(config.seed))
+        self.drawn = time.process_time() - begin
+        self.peer = Peer()
+
+    def ours(self) -> list[Optimum]:
+        """The planner's own steps."""
+        problem, grids, options = self.problem, self.grids, self.options
+        batch, context = Batch(problem, options), Context()
+        starts = planner._optimise_starts(problem, grids[0], options, self.motions, batch, context)
+        basins = [starts[index] for index in planner._basins(problem, starts, options)]
+        return self._kept(planner._refine_all(problem, grids, options, basins, batch, context))
+
+    def theirs(self) -> list[Optimum]:
+        """The same steps, every solve by the peer."""
+        problem, grids, options = self.problem, self.grids, self.options
+        first = optimum.first_order(problem)
+        with mock.patch.object(optimum, "optimise", self.peer.optimise):
+            starts = [self.peer.optimise(first, grids[0], motion, options) for motion in self.motions]
+            chosen = [starts[index] for index in planner._basins(problem, starts, options)]
+            if first is not problem:
+                starts = [optimum.go_on((problem, grids[0], options), start) for start in chosen]
+                chosen = [starts[index] for index in planner._basins(problem, starts, options)]
+            return self._kept([optimum.refine((problem, grids, options), start) for start in chosen])
+
+    def _kept(self, fine: list[Optimum]) -> list[Optimum]:
+        good = [one for one in fine if one.converged and one.continuous]
+        return [good[index] for index in planner._distinct(good, self.options, self.problem)]
+
+
 def simulation(name: str, *words: str) -> None:
-    """One line for the multi-start, one for `starts=dynamic_programming` where that applies, and the optima of all."""
-    with initialize_config_dir(str(peer.PROJECT / "conf"), version_base="1.3"):
-        config = checked(compose("config", overrides=[f"+experiment={name}", *words]))
-    problem, options = prepare(config), config.method.global_
-    grids = planner.refinement(problem.times, options.coarse_steps)
-    motions, _ = planner._starts(problem, grids[0], options, np.random.default_rng(config.seed))
-    ours, theirs = Side(optimum._optimise), Peer()
-    sides = (ours, theirs)
-    for number, motion in enumerate(motions):
-        for side in sides if number % 2 else sides[::-1]:
-            side.starts.append(side.run(optimum.optimise_start, (problem, grids[0], options), motion))
-    for side in sides:
-        basins = planner._basins(problem, side.starts, options)
-        fine = [side.run(optimum.refine, (problem, grids, options), side.starts[basin]) for basin in basins]
-        side.optima = keep(problem, options, fine)
-    counts = [sum(start.converged for start in side.starts) for side in sides]
-    note = f"of {len(motions)} starts {counts[0]} and {counts[1]} converged; CasADi built its functions in"
-    line(f"{name}, population", ours.seconds, theirs.seconds, f"{note} {theirs.construction:.2f} s besides")
-    found = {"ours": ours.optima, "peer": theirs.optima}
-    if not problem.objective.second_order:
-        begin = time.perf_counter()
-        solutions = global_planner(problem, replace(options, starts="dynamic_programming"), Context(config.seed))
-        seconds = time.perf_counter() - begin
-        grown = np.array([solution.trajectory.q for solution in solutions if solution.status is Status.SOLVED])
-        costs = objective_values(problem, problem.times, grown)
-        found["dp"] = [Optimum(q, float(cost), True, "") for q, cost in zip(grown, costs, strict=True)]
-        line(f"{name}, dynamic_programming", seconds, theirs.seconds, "the whole planner against the same peer")
+    """One line, and the optima of both; `words` change the experiment."""
+    plan = Plan(name, *words)
+    plan.theirs()  # the peer's functions are made
+    milliseconds: dict[str, list[float]] = {"ours": [], "peer": []}
+    found: dict[str, list[Optimum]] = {}
+    calls: dict[str, Callable[[], list[Optimum]]] = {"ours": plan.ours, "peer": plan.theirs}
+    for repeat in range(REPEATS):
+        for side in list(calls)[:: 1 if repeat % 2 else -1]:
+            begin = time.process_time()
+            found[side] = calls[side]()
+            milliseconds[side].append(1e3 * (time.process_time() - begin))
+    ours, theirs = (float(np.median(milliseconds[side])) for side in ("ours", "peer"))
+    note = f"{len(plan.motions)} starts; the peer's functions took {plan.peer.construction:.1f} s besides"
+    print(f"{name:<24} {ours:9.0f} {theirs:9.0f} {ours / theirs:7.2f} {1e3 * plan.drawn:11.0f}   {note}", flush=True)
     for label, optima in found.items():
         print(f"  {label:<5}{'  '.join(f'{one.cost:.6f}' for one in optima)}")
-    agreement(problem, theirs.program(problem, problem.times, options), found)
-
-
-def keep(problem: Problem, options: GlobalOptions, fine: list[Optimum]) -> list[Optimum]:
-    good = [optimum for optimum in fine if optimum.converged and optimum.continuous]
-    return [good[index] for index in planner._distinct(good, options, problem)]
+    agreement(plan.problem, plan.peer.program(plan.problem, plan.problem.times, plan.options), found)
 
 
 def agreement(problem: Problem, program: peer.Program, found: dict[str, list[Optimum]]) -> None:
     """Every optimum recomputed by both sides, by the peer with path and limits, and whether the lists agree."""
-    everything = [optimum for optima in found.values() for optimum in optima]
-    checks = [program.check(optimum.q) for optimum in everything]
-    costs = objective_values(problem, problem.times, np.array([optimum.q for optimum in everything]))
+    everything = [one for optima in found.values() for one in optima]
+    checks = [program.check(one.q) for one in everything]
+    costs = objective_values(problem, problem.times, np.array([one.q for one in everything]))
     apart = max(abs(check[0] / cost - 1) for check, cost in zip(checks, costs, strict=True))
-    lists = {tuple(f"{optimum.cost:.6f}" for optimum in optima) for optima in found.values()}
+    lists = {tuple(f"{one.cost:.6f}" for one in optima) for optima in found.values()}
     print("  the lists agree" if len(lists) == 1 else "  THE LISTS DIFFER")
     print(f"  recomputed by both: costs within {apart:.0e}, path and limits kept to {max(c[1] for c in checks):.0e}")
-
-
-def line(name: str, ours: float, theirs: float, note: str) -> None:
-    print(f"{name:<34} {ours:9.2f} {theirs:9.2f} {ours / theirs:7.2f}   {note}", flush=True)
 
 
 def main(names: list[str]) -> None:

@@ -35,7 +35,8 @@ PANDA = ("robot=panda", "path.direction=[0,1,0]", "path.length=0.1")
         ((*FREE, "base.linear_momentum=[0,0,1]"), r"base: a planar arm has linear momentum in x and y"),
         (
             (*FREE, "methods=[dynamic_programming]"),
-            r"dynamic_programming: the base is floating; .* fixed base; methods that serve this problem: lsv, inertia_weighted, pmke, receding, global, pareto$",
+            r"dynamic_programming: the base is floating; .* fixed base; "
+            r"methods that serve this problem: lsv, inertia_weighted, pmke, receding, global, pareto$",
         ),
         (
             (*FREE, "methods=[calculus_of_variations,pontryagin]"),
@@ -44,7 +45,7 @@ PANDA = ("robot=panda", "path.direction=[0,1,0]", "path.length=0.1")
         (("objective=reaction", "methods=[pontryagin]"), r"pontryagin: the base is (held|floating); .* fixed base"),
         (
             (*FREE, "method.global.starts=both"),
-            r"global: method\.global\.starts = both: dynamic_programming: the base is floating; .* starts = population",
+            r"global: method\.global\.starts = both: dynamic_programming: the base is floating; .* starts = roadmap",
         ),
         ((*FREE, "closed_loop.run=true"), r"closed_loop\.run: the controller is one for arms on a fixed base"),
         (("objective=reaction", "objective.torque=0"), r"objective = reaction: all its weights are zero"),

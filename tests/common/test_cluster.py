@@ -30,9 +30,9 @@ from pipeline.config import run as config
 from pipeline.methods.global_planner.planner import global_planner
 from pipeline.methods.method import Context
 from pipeline.run.run import UNFINISHED
+from tests.commands import assert_refused, call
 from tests.common.test_workers import SIM1
 from tests.killed import run_and_kill
-from tests.run.test_main import assert_refused, call
 from tests.support import ROOT
 from tests.tasks import (
     HUNG,

@@ -17,8 +17,8 @@ from pipeline.config import run as config
 from pipeline.methods import method
 from pipeline.methods.global_planner.planner import global_planner
 from pipeline.run.run import UNFINISHED
+from tests.commands import call
 from tests.killed import run_and_kill
-from tests.run.test_main import call
 from tests.support import RUN_FILES
 from tests.tasks import Context, calls, fail_at_three, in_pairs, kept, multiply, nothing
 

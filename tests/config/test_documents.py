@@ -29,6 +29,8 @@ def test_a_misprint_is_read_as_what_was_meant() -> None:
 def test_what_is_no_cell_of_the_table_is_left_out() -> None:
     """A peak up to a moment, a largest positive velocity, words, and what belongs to a later optimum."""
     assert "peak_velocity_1" not in printed_for("traj3").numbers["lsv"]
+    assert "wall_time_s" not in printed_for("sim1_validation").numbers["global"]  # of another machine
+    assert "wall_time_s" not in printed_for("traj1").numbers["pmke"]
     assert "peak_velocity_3" not in printed_for("traj2").numbers["lsv"]
     assert printed_for("case2").numbers == {}
     assert printed_for("sim1_validation").numbers["global"]["kinetic_energy_integral"] == 0.0528

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -29,11 +30,16 @@ OPTIONS = sorted(
 METHODS = sorted(file.stem for file in (CONF / "method").glob("[!_]*.yaml"))
 
 
+@cache
 def composed(*overrides: str) -> DictConfig:
+    """Nobody changes what is shared here."""
     with initialize_config_dir(str(CONF), version_base="1.3"):
-        return compose("config", overrides=list(overrides), return_hydra_config=True)
+        made = compose("config", overrides=list(overrides), return_hydra_config=True)
+    OmegaConf.set_readonly(made, True)
+    return made
 
 
+@cache
 def checked(*overrides: str) -> schema.RunConfig:
     with initialize_config_dir(str(CONF), version_base="1.3"):
         return composing.checked(compose("config", overrides=list(overrides)))

@@ -11,7 +11,7 @@ from pipeline.artifacts.recording.recording import read_series
 from pipeline.describe import __main__ as command
 from pipeline.describe.facts import Facts, inspect
 from pipeline.describe.show import sweep
-from tests.run.test_main import Run, assert_refused, call
+from tests.commands import Run, assert_refused, call
 from tests.support import composed, robot, within_limits
 
 

@@ -33,6 +33,8 @@ class Traced:
     task: PositionTask
     spline: CubicSpline
     timing: Timing
+    tolerance: float = np.inf
+    orientation_tolerance: float = np.inf
 
     def position(self, t: Array) -> Array:
         return self.task.value(self.spline(t))

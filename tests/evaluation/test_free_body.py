@@ -1,4 +1,4 @@
-"""Motions on a floating base: momentum and path found again from the joints alone, limits, starts, heavy bases, reactions."""
+"""Motions on a floating base: momentum and path found again from the joints, limits, starts, heavy bases, reactions."""
 
 from __future__ import annotations
 
@@ -159,7 +159,7 @@ def test_an_attitude_that_is_exceeded_is_named() -> None:
 
 
 def test_a_fine_grid_does_not_make_a_cycle_harder() -> None:
-    """Closed joints leave the base turns about the centre of mass alone: rows that these cannot change must not be there."""
+    """Closed joints leave the base turns about the centre of mass alone: rows that these cannot change must go."""
     _, solution = stated(*ON_BASE, *CIRCLE, "timing.steps=100", "method.global.optimised=1")
     assert solution.status is Status.SOLVED, solution.message
     assert solution.statistics["solves"][-1]["iterations"] < 30
@@ -168,7 +168,7 @@ def test_a_fine_grid_does_not_make_a_cycle_harder() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("orientation", ["none", "full"])
 def test_cycles_in_space(orientation: str) -> None:
-    """Closed joints and position leave the base one turn, about the line from the centre of mass to the end effector."""
+    """Closed joints and position leave the base a turn about the line from the centre of mass to the end effector."""
     words = ("robot=panda", "base=free", "base.mass=60", "base.inertia=4.9", "base.com=[0,0,-0.35]", *CIRCLE)
     around = ("path.center_direction=[0,1,0]", "path.normal=[1,0,0]", f"robot.orientation={orientation}")
     e = solved(

@@ -127,7 +127,7 @@ def test_a_free_start_is_better(case: str) -> None:
 
 @pytest.mark.slow
 def test_extremals_and_their_kinds_agree_with_the_calculus_of_variations() -> None:
-    """Shooting and scanning on one side, collocation on the other: all three extremals of case 3, two minima, a saddle."""
+    """Shooting and scanning on one side, collocation on the other: all extremals of case 3, two minima and a saddle."""
     scanned = calculus_of_variations(stated("case3"))
     found = pontryagin(stated("case3"), PontryaginOptions())
     assert len(scanned) == len(found) == 3

@@ -1,4 +1,4 @@
-"""Every method on every kind of problem: it returns motions, or refuses with one line, alike from Python and a command."""
+"""Every method on every kind of problem: motions, or a refusal of one line, alike from Python and a command."""
 
 from __future__ import annotations
 
@@ -134,7 +134,7 @@ def test_starts_by_dynamic_programming_serve_what_it_serves(starts: str) -> None
         line = METHODS["global"].why_not(prepare(asked(problem, "global")), options)
         assert line is not None
         assert line.startswith(f"global: method.global.starts = {starts}: dynamic_programming: ")
-        assert line.endswith("; starts = population serves every problem")
+        assert line.endswith("; starts = roadmap serves every problem")
 
 
 def test_a_front_is_refused_where_the_planner_is_or_two_integrals_are_not_given() -> None:

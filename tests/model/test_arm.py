@@ -35,7 +35,8 @@ def spatial_urdf() -> str:
             f'<joint name="j{i}" type="{kind}"><parent link="l{i - 1}"/><child link="l{i}"/>'
             f'<origin xyz="{xyz}" rpy="{rpy}"/><axis xyz="{axis}"/>'
             f'<limit lower="-2" upper="2" effort="{10 * i}" velocity="{i}"/></joint>'
-            f'<link name="l{i}"><inertial><origin xyz="0.0{i} 0.02 -0.03" rpy="0.1 0.2 0.{i}"/><mass value="{3.5 - 0.4 * i}"/>'
+            f'<link name="l{i}"><inertial><origin xyz="0.0{i} 0.02 -0.03" rpy="0.1 0.2 0.{i}"/>'
+            f'<mass value="{3.5 - 0.4 * i}"/>'
             '<inertia ixx="0.02" iyy="0.025" izz="0.03" ixy="0.002" ixz="-0.001" iyz="0.003"/></inertial></link>'
         )
     return (

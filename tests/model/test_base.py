@@ -1,4 +1,4 @@
-"""Bases that stand still: to every question they answer with what changes nothing. Those that float: `test_floating.py`."""
+"""Bases that stand still: they answer every question with what changes nothing. The others: `test_floating.py`."""
 
 from __future__ import annotations
 

@@ -134,7 +134,8 @@ def test_shapes_of_a_description() -> None:
 
     root = ET.fromstring(
         '<robot><link name="a"><collision><geometry><sphere radius="0.1"/></geometry></collision>'
-        '<collision><origin xyz="1 2 3" rpy="0 0 1.5"/><geometry><cylinder radius="0.2" length="0.5"/></geometry></collision></link>'
+        '<collision><origin xyz="1 2 3" rpy="0 0 1.5"/>'
+        '<geometry><cylinder radius="0.2" length="0.5"/></geometry></collision></link>'
         '<link name="b"><collision><geometry><box size="1 2 3"/></geometry></collision>'
         '<collision><geometry><mesh filename="x.stl"/></geometry></collision></link></robot>'
     )

@@ -1,4 +1,4 @@
-"""Arms on a base that moves, against Drake's own free body with a quaternion, and a simulation under internal torques."""
+"""Arms on a base that moves, against Drake's free body with a quaternion, and a simulation under internal torques."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def pose(arm: Arm, q: Array) -> tuple[Array, Rotation]:
 
 
 def free_state(arm: Arm, q: Array, qd: Array) -> tuple[BasePlant, Array]:
-    """Drake's free body in the same state, its base velocities by central differences of the pose; and those velocities."""
+    """Drake's free body in the same state, its base velocities by central differences of the pose; and these."""
     plant, h, nb = BasePlant(arm), 1e-6, arm.base.count
     position, rotation = pose(arm, q)
     (ahead, turned), (behind, back) = pose(arm, q + h * qd), pose(arm, q - h * qd)
@@ -172,7 +172,7 @@ def test_derivatives_equal_central_differences(arm: Arm, rng: np.random.Generato
 
 
 def test_center_of_mass_and_mean_momentum(arm: Arm, rng: np.random.Generator) -> None:
-    """The centre is Drake's; over an interval the linear momentum is what moves it, the angular one that of the middle."""
+    """The centre is Drake's; over an interval the linear momentum is what moves it, the angular one is the middle's."""
     base, (q, qd) = arm.base, states(arm, 3, rng)
     assert isinstance(base, Floating)
     dt, h = np.array([0.1, 0.2, 0.3]), 1e-5

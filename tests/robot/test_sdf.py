@@ -63,7 +63,8 @@ def as_sdf(robot: str, frames: dict[str, Array], root: str = "base") -> str:
         assert axis is not None
         bounds = "".join(f"<{key}>{value}</{key}>" for key, value in limit.items())
         parts.append(
-            f'<joint name="{joint.get("name")}" type="{joint.get("type")}"><parent>{before}</parent><child>{after}</child>'
+            f'<joint name="{joint.get("name")}" type="{joint.get("type")}">'
+            f"<parent>{before}</parent><child>{after}</child>"
             f'<pose relative_to="{after}">{text(np.linalg.inv(frames[after]))}</pose>'
             f"<axis><xyz>{axis.get('xyz')}</xyz><limit>{bounds}</limit></axis></joint>"
         )
@@ -120,7 +121,8 @@ FAULTS = {  # what is wrong: old text, new text, what the message must name
     "a joint that turns every way": ('"elbow" type="revolute"', '"elbow" type="ball"', ["elbow", "ball", "revolute"]),
     "a joint that mimics": (
         "<xyz>0.6 0.8 0</xyz>",
-        '<xyz>0.6 0.8 0</xyz><mimic joint="shoulder"><multiplier>1</multiplier><offset>0</offset><reference>0</reference></mimic>',
+        '<xyz>0.6 0.8 0</xyz><mimic joint="shoulder">'
+        "<multiplier>1</multiplier><offset>0</offset><reference>0</reference></mimic>",
         ["elbow", "mimics", "robot.locked.elbow"],
     ),
     "a link that floats": ("</model>", '<link name="stray"/></model>', ["2", "base", "stray"]),

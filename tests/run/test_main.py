@@ -2,93 +2,18 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
-from collections.abc import Callable
-from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 from hydra import compose, initialize_config_dir
-from hydra.core.global_hydra import GlobalHydra
 
 from pipeline.build.problem import prepare
 from pipeline.config import run as config
 from pipeline.config.compose import checked
 from pipeline.problem.objective import Objective
-from pipeline.run import main as __main__
-from pipeline.run import session
 from pipeline.run.main import CONF
-from tests.support import ROOT
-
-
-@dataclass(frozen=True)
-class Answer:
-    code: int
-    out: str
-    error: str
-
-
-Run = Callable[..., Answer]
-
-
-def call(
-    monkeypatch: pytest.MonkeyPatch,
-    capfd: pytest.CaptureFixture[str] | None,
-    *words: str,
-    entry: Callable[[], int] = __main__.main,
-) -> Answer:
-    """The command line within this process: no imports to wait for. What it prints is lost without `capfd`."""
-    monkeypatch.setenv("HYDRA_FULL_ERROR", "0")  # main() sets it; this puts it back
-    monkeypatch.setattr(session, "exit_code", 0)
-    monkeypatch.setattr(sys, "argv", ["pipeline", *words])
-    GlobalHydra.instance().clear()
-    if capfd is not None:
-        capfd.readouterr()
-    try:
-        code = entry()
-    except SystemExit as leaving:
-        code = int(leaving.code or 0)
-    finally:
-        GlobalHydra.instance().clear()
-    return Answer(code, *(capfd.readouterr() if capfd is not None else ("", "")))
-
-
-@pytest.fixture
-def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Run:
-    """Call the command line in an empty folder; results would go to `outputs/` there."""
-    monkeypatch.chdir(tmp_path)
-    return partial(call, monkeypatch, capfd)
-
-
-def command(*words: str, folder: Path, timeout: float = 120) -> Answer:
-    """The command line as a process of its own, started in `folder`."""
-    environment = {**os.environ, "PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
-    done = subprocess.run(
-        [sys.executable, "-m", "pipeline", *words],
-        cwd=folder,
-        env=environment,
-        capture_output=True,
-        text=True,
-        timeout=timeout,
-        check=False,
-    )
-    return Answer(done.returncode, done.stdout, done.stderr)
-
-
-def assert_refused(answer: Answer, *named: str) -> None:
-    lines = answer.error.splitlines()
-    assert answer.code == 2, answer
-    assert len(lines) == 1, answer.error
-    assert lines[0].startswith("error: ")
-    assert "Traceback" not in answer.error + answer.out
-    assert "Error(" not in lines[0]
-    for words in named:
-        assert words in lines[0], f"{words!r} is missing in: {lines[0]}"
-
+from tests.commands import Run, assert_refused, command
 
 # What is asked, and what the one line must name.
 REFUSED = {
@@ -128,46 +53,13 @@ REFUSED = {
         ["methods=[pareto]", "method.pareto.objectives=[kinetic_energy]"],
         ["method.pareto.objectives = [kinetic_energy]", "two integrals"],
     ),
-    "no method": (["methods=[]"], ["methods", "lsv", "pmke", "global"]),
-    "method twice": (["methods=[lsv,lsv]"], ["methods", "twice"]),
     "methods no list": (["methods=lsv"], ["methods", "list", "pmke"]),
     "type number": (["path.length=long"], ["path.length", "long", "number"]),
-    "type count": (["timing.steps=10.5"], ["timing.steps", "10.5", "whole number"]),
     "type switch": (["path=circle", "path.clockwise=perhaps"], ["path.clockwise", "perhaps", "true or false"]),
-    "type list": (["robot.q_init=0.3"], ["robot.q_init", "list"]),
-    "type table": (["timing=3"], ["timing", "3"]),
     "seed": (["seed=-1"], ["seed", "-1", ">= 0"]),
-    "null": (["timing.duration=null"], ["timing.duration", "> 0"]),
-    "infinite": (["timing.duration=inf"], ["timing.duration", "> 0"]),
-    "nan": (["path.length=nan"], ["path.length", "> 0"]),
-    "negative duration": (["timing.duration=-1"], ["timing.duration", "-1", "> 0", "s"]),
-    "zero duration": (["timing.duration=0"], ["timing.duration", "> 0"]),
-    "negative steps": (["timing.steps=-5"], ["timing.steps", "-5", ">="]),
-    "no steps": (["timing.steps=0"], ["timing.steps", "0", ">="]),
-    "dense": (["timing.dense=[[2,1,3]]"], ["timing.dense", "from", "factor"]),
-    "negative length": (["path.length=-0.1"], ["path.length", "-0.1", "> 0"]),
-    "choice": (["method.lsv.integrator=rk4"], ["method.lsv.integrator", "rk4", "euler", "heun"]),
-    "horizon": (["method.pmke.horizon=0"], ["method.pmke.horizon", "0", ">= 1"]),
-    "workers": (["parallel.workers=0"], ["parallel.workers", "0", ">= 1"]),
     "out of reach": (["path.length=2.0", "path.direction=0"], ["path", "out of reach from", "m along", "misses it by"]),
-    "start out of reach": (["path.start=[3.0,0.0]"], ["start", "out of reach", "m"]),
-    "start length": (["path.start=[0.3,0.1,0.0]"], ["path.start", "2 numbers"]),
-    "direction": (["path.direction=[0,0]"], ["path.direction", "2 numbers"]),
-    "direction in space": (["path.direction=[0,0,1]"], ["path.direction", "2 numbers"]),
     "no urdf": (["robot.urdf=nowhere.urdf"], ["nowhere.urdf"]),
-    "no frame": (["robot.end_effector=hand"], ["hand", "tip"]),
-    "no base": (["robot.base=floor"], ["floor"]),
-    "no redundancy": (["robot.task=[x,y,z]"], ["robot.task", "3 joints", "3 task coordinates"]),
-    "task word": (["robot.task=[x,w]"], ["robot.task", "w", "x, y, z"]),
-    "q_init short": (["robot.q_init=[0.1,0.2]"], ["robot.q_init", "2", "3", "joint1"]),
-    "q_init long": (["robot.q_init=[0.1,0.2,0.3,0.4]"], ["robot.q_init", "4", "3"]),
-    "q_init word": (["robot.q_init=[0.1,0.2,up]"], ["robot.q_init[2]", "up", "number"]),
     "locked joint": (["+robot.locked.elbow=0.1"], ["robot.locked", "elbow", "joint1"]),
-    "locked table": (["robot.locked={elbow: 0.1}"], ["robot.locked", "elbow"]),
-    "urdf null": (["robot.urdf=null"], ["robot.urdf", "null"]),
-    "limits length": (["limits.velocity=[1.0,2.0]"], ["limits.velocity", "2", "3"]),
-    "limits sign": (["limits.velocity=-1"], ["limits.velocity", "-1", "> 0"]),
-    "limits contradict": (["limits.lower=1.0", "limits.upper=-1.0"], ["limits.lower", "limits.upper", "joint1"]),
     "weights": (
         ["objective=weighted", "objective.torque=0.7"],
         ["objective.kinetic_energy", "objective.torque", "1.2"],
@@ -184,7 +76,6 @@ REFUSED = {
     "group empty": (["path="], ["path", "line"]),
     "interpolation": (["path.length=${nothing}"], ["path.length", "nothing"]),
     "mandatory missing": (["name=???"], ["name"]),
-    "far too many steps": (["timing.steps=100000000000"], ["timing.steps"]),
     "two experiments without -m": (["+experiment=traj1,traj2"], ["experiment", "multirun"]),
 }
 
@@ -236,57 +127,6 @@ def test_an_objective_is_what_it_is_called(kind: str) -> None:
         config = checked(compose("config", overrides=[f"objective.kind={kind}"]))
     assert config.objective.kind == kind
     assert prepare(config).objective == Objective({kind: 1.0})
-
-
-URDF = """<robot name="bad">
-  <link name="base"/>
-  {links}
-</robot>"""
-JOINT = """<joint name="j{i}" type="revolute"><parent link="{parent}"/><child link="l{i}"/><origin xyz="0.2 0 0"/>
-  <axis xyz="0 0 1"/><limit lower="-2" upper="2" velocity="3" effort="1"/></joint>"""
-
-
-def robot(joints: int, inertia: str) -> str:
-    parents = ["base", *[f"l{i}" for i in range(joints)]]
-    links = [f'<link name="l{i}">{inertia}</link>' + JOINT.format(i=i, parent=parents[i]) for i in range(joints)]
-    return URDF.format(links="\n  ".join(links))
-
-
-SOLID = '<inertial><mass value="1"/><inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial>'
-ROBOTS = {
-    "no inertia": (robot(3, ""), 3, ["inertia"]),
-    "unphysical inertia": (robot(3, SOLID.replace('izz="0.1"', 'izz="0.5"')), 3, ["l0", "inertia that no body has"]),
-    "a floating joint": (robot(3, SOLID).replace("revolute", "floating", 1), 3, ["j0", "floating", "revolute"]),
-    "a mimicking joint": (
-        robot(3, SOLID).replace("</joint>", '<mimic joint="j1"/></joint>', 1),
-        3,
-        ["j0", "mimics", "robot.locked.j0"],
-    ),
-    "two joints for two coordinates": (robot(2, SOLID), 2, ["robot.task", "2 joints", "redundancy"]),
-    "not xml": ("<robot", 3, ["arm.urdf"]),
-    "another document": ("<sdf/>", 3, ["arm.urdf"]),
-}
-
-
-@pytest.mark.parametrize("name", ROBOTS)
-def test_bad_robots(name: str, run: Run, tmp_path: Path) -> None:
-    text, joints, named = ROBOTS[name]
-    file = tmp_path / "arm.urdf"
-    file.write_text(text, encoding="utf-8")
-    q_init = ",".join(["0.3"] * joints)
-    answer = run(
-        f"robot.urdf={file}", f"robot.end_effector=l{joints - 1}", f"robot.q_init=[{q_init}]", "path.length=0.05"
-    )
-    assert_refused(answer, *named)
-    assert [file.name for file in tmp_path.iterdir()] == ["arm.urdf"]
-
-
-def test_a_robot_without_any_fault_is_taken(run: Run, tmp_path: Path) -> None:
-    """So that the test above fails for the reason it names."""
-    file = tmp_path / "arm.urdf"
-    file.write_text(robot(3, SOLID), encoding="utf-8")
-    words = [f"robot.urdf={file}", "robot.end_effector=l2", "robot.q_init=[0.3,0.4,0.3]", "path.length=0.05"]
-    assert_refused(run(*words, "boundary=cyclic"), "boundary")  # got as far as the last check
 
 
 @pytest.mark.parametrize(
@@ -350,19 +190,3 @@ def test_bad_input_as_a_process(tmp_path: Path) -> None:
     assert_refused(answer, "path.lenght", "did you mean length")
     assert answer.out == ""
     assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.slow
-def test_a_bad_robot_as_a_process(tmp_path: Path) -> None:
-    """Neither Drake nor Hydra adds a line of its own."""
-    file = tmp_path / "arm.sdf"
-    links = [f'<link name="l{i}"><pose>0.{2 * i} 0 0 0 0 0</pose>{{}}</link>' for i in range(4)]
-    bad = "<inertial><mass>1</mass><inertia><ixx>0.1</ixx><iyy>0.1</iyy><izz>0.5</izz></inertia></inertial>"
-    joint = '<joint name="j{0}" type="revolute"><parent>l{0}</parent><child>l{1}</child><axis><xyz>0 0 1</xyz></axis></joint>'
-    joints = [joint.format(i, i + 1) for i in range(3)]
-    model = "".join([*(link.format(bad) for link in links), *joints])
-    file.write_text(f'<sdf version="1.9"><model name="arm">{model}</model></sdf>', encoding="utf-8")
-    answer = command(f"robot.urdf={file}", "robot.end_effector=l3", "robot.q_init=[0.1,0.2,0.3]", folder=tmp_path)
-    assert_refused(answer, "robot.urdf", "link 'l1'", "inertia that no body has")
-    assert answer.out == ""
-    assert [file.name for file in tmp_path.iterdir()] == ["arm.sdf"]

@@ -16,15 +16,15 @@ from pipeline.common.workers import Workers
 from pipeline.config.run import RunConfig
 from pipeline.problem.problem import Problem
 from pipeline.run import run as run_module
+from tests.commands import Answer, call, command
 from tests.killed import run_and_kill
 from tests.reports import leave_out_pictures
-from tests.run.test_main import Answer, call, command
 from tests.tasks import kept
 
 Sweep = Callable[..., Answer]
 LSV = (
     *("-m", "name=traj1", "methods=[lsv]", "timing.steps=10", "method.lsv.dt=0.05", "path=line"),
-    "hydra.sweep.dir=all",
+    *("export.method=none", "hydra.sweep.dir=all"),
 )
 
 

@@ -10,8 +10,8 @@ import pytest
 from pipeline.config.run import RunConfig
 from pipeline.problem.problem import Problem
 from pipeline.run import state
+from tests.commands import call
 from tests.reports import leave_out_pictures
-from tests.run.test_main import call
 from tests.support import composed
 
 SMALL = ("methods=[lsv]", "timing.duration=1", "timing.steps=10", "path.length=0.1", "parallel.workers=1")

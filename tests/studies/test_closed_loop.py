@@ -73,7 +73,7 @@ def test_a_weak_motor_is_reported_and_never_gives_more_than_it_can(case: Case) -
 
 
 def test_the_simulated_arm_gets_no_more_than_the_limit(case: Case) -> None:
-    """What the plant gains in kinetic energy, a motor at its limit can have given: the cut is in the loop, not in the log."""
+    """What the plant gains in kinetic energy, a motor at its limit can have given: the loop is cut, not the log."""
     problem, motion = case
     strongest = np.abs(motion.tau).max()
     loop = simulate(weak(problem, 0.01 * strongest), motion, OPTIONS)

@@ -61,8 +61,8 @@ class _Family:
 
 
 def solve(problem: Problem, options: CalculusOfVariationsOptions, context: Context) -> list[Solution]:
-    """All stationary motions on problem.times, cheapest first. Their statistics: `integral`, the objective in continuous
-    time, `kind` (minimum or saddle), `index`, `unknown` [rad or rad/s] and `residual` t' M qd at T.
+    """All stationary motions on problem.times, cheapest first. Their statistics: `integral`, the objective in
+    continuous time, `kind` (minimum or saddle), `index`, `unknown` [rad or rad/s] and `residual` t' M qd at T.
     """
     found: list[tuple[_Family, float]] = []
     near: list[tuple[float, float]] = []
@@ -163,7 +163,7 @@ def _residual(problem: Problem, state: Array) -> Array:
 
 
 def _scan(problem: Problem, family: _Family, options: CalculusOfVariationsOptions) -> tuple[Array, Array, Array]:
-    """Unknowns in order (P,), residuals (P,), final configurations (P, n): even, then split where that is not enough."""
+    """Unknowns in order (P,), residuals (P,), final configurations (P, n): even, then split where that is too few."""
     count = max(16, int(np.ceil((family.high - family.low) / options.spacing)))
     u = np.linspace(family.low, family.high, count + 1)
     value, end = _final(problem, family, u, options.scan_tolerance, MOST_SCAN_STEPS)
@@ -192,7 +192,7 @@ def _valleys(value: Array) -> NDArray[np.intp]:
 
 
 def _near_misses(u: Array, value: Array) -> list[tuple[float, float]]:
-    """(unknown, residual) where it nearly vanishes: a grid of finite step can have an optimum there that time has not."""
+    """(unknown, residual) where it nearly vanishes: a grid of finite step can have an optimum there; time has none."""
     low = _valleys(value)
     low = low[np.abs(value[low]) < NEAR_MISS * np.nanmedian(np.abs(value))]
     return [(float(u[i]), float(value[i])) for i in low]

@@ -42,6 +42,9 @@ CLEARANCE_ROUNDS = 5
 STRAYED = 1.5  # times the guess's cost, from where on a solve has left it
 
 
+STAYS = 0.01  # of the path's length, that a motion may leave it between its knots
+
+
 @dataclass(frozen=True)
 class Optimum:
     """One local optimum on one grid, with the statistics of the solves that led to it."""
@@ -54,36 +57,43 @@ class Optimum:
     solves: list[dict[str, Any]] = field(default_factory=list)
 
 
-def optimise_start(context: tuple[Problem, Array, GlobalOptions], guess: Array) -> Optimum:
-    """One start on the coarse grid. Torques are optimised from a motion of little energy within the same limits.
+def first_order(problem: Problem) -> Problem:
+    """The problem that is solved first: without torques, and with little energy where torques alone would count.
 
     From a wild motion the torque program fails often; and where even that energy program is infeasible, so is it.
     """
+    if not problem.objective.second_order and not _limits_torque(problem):
+        return problem
+    quadratic = Lagrangian(problem.task, problem.objective).is_quadratic
+    only = replace(problem.objective, weights=of_order(problem.objective.weights, 1))
+    return replace(_without_torque_limits(problem), objective=only if quadratic else Objective())
+
+
+def optimise_start(context: tuple[Problem, Array, GlobalOptions], guess: Array) -> Optimum:
+    """One start on the coarse grid, its first-order problem first."""
     problem, times, options = context
-    solves: list[dict[str, Any]] = []
-    first: Optimum | None = None
-    if problem.objective.second_order or _limits_torque(problem):
-        first_order = Lagrangian(problem.task, problem.objective).is_quadratic
-        only = replace(problem.objective, weights=of_order(problem.objective.weights, 1))
-        objective = only if first_order else Objective()
-        first = _optimise(replace(_without_torque_limits(problem), objective=objective), times, guess, options)
-        solves += first.solves
-        if not first.converged:
-            return replace(first, solves=solves)
-        guess = first.q
-        if not problem.objective.second_order and _keeps_torque_limits(problem, times, guess):
-            return first
-    optimum = _optimise(problem, times, guess, options)
+    return go_on(context, optimise(first_order(problem), times, guess, options))
+
+
+def go_on(context: tuple[Problem, Array, GlobalOptions], first: Optimum) -> Optimum:
+    """From the first-order problem's optimum to that of the problem itself, where it is another."""
+    problem, times, options = context
+    served = not problem.objective.second_order and keeps_torque_limits(problem, times, first.q)
+    if not first.converged or served:
+        return first
+    guess = first.q
+    optimum = optimise(problem, times, guess, options)
     goes_on = len(times) < len(problem.times)
-    if first is not None and goes_on and _has_strayed(problem, times, guess, optimum):
+    if goes_on and _has_strayed(problem, times, guess, optimum):
         cost = float(objective_values(problem, times, guess[None])[0])
         optimum = replace(first, cost=cost, solves=optimum.solves)
-    return replace(optimum, solves=solves + optimum.solves)
+    return replace(optimum, solves=first.solves + optimum.solves)
 
 
 def _has_strayed(problem: Problem, times: Array, guess: Array, optimum: Optimum) -> bool:
-    """Whether a solve ended far above a guess that keeps every limit: its first steps led into a motion with jumps, which
-    coarse differences make an optimum of its own. A finer grid then starts from the guess. Accelerations must count for it.
+    """Whether a solve ended far above a guess that keeps every limit: its first steps led into a motion with jumps,
+    which coarse differences make an optimum of its own. A finer grid then starts from the guess. Accelerations must
+    count for it.
     """
     if not problem.objective.second_order:
         return False
@@ -101,8 +111,10 @@ def _without_torque_limits(problem: Problem) -> Problem:
     return replace(problem, limits=replace(problem.bounds, torque=free, power=free))
 
 
-def _keeps_torque_limits(problem: Problem, times: Array, q: Array) -> bool:
+def keeps_torque_limits(problem: Problem, times: Array, q: Array) -> bool:
     """Whether torque and power limits are kept with some room: an optimum without them is then one with them."""
+    if not _limits_torque(problem):
+        return True
     worst = [v.relative for v in violations(problem, times, q) if v.kind in ("torque", "power")]
     return all(relative < -ROOM for relative in worst)
 
@@ -110,22 +122,22 @@ def _keeps_torque_limits(problem: Problem, times: Array, q: Array) -> bool:
 def _optimise_lazily(
     problem: Problem, times: Array, guess: Array, options: GlobalOptions, keep_off: float = 0.0
 ) -> Optimum:
-    """As `_optimise`; but where torque limits alone bring torques in and the guess keeps them, it is tried without."""
+    """As `optimise`; but where torque limits alone bring torques in and the guess keeps them, it is tried without."""
     if (
         problem.objective.second_order
         or of_order(problem.bounds_of_integrals, 2)
         or not _limits_torque(problem)
-        or not _keeps_torque_limits(problem, times, guess)
+        or not keeps_torque_limits(problem, times, guess)
     ):
-        return _optimise(problem, times, guess, options, keep_off)
-    optimum = _optimise(_without_torque_limits(problem), times, guess, options, keep_off)
-    if not optimum.converged or _keeps_torque_limits(problem, times, optimum.q):
+        return optimise(problem, times, guess, options, keep_off)
+    optimum = optimise(_without_torque_limits(problem), times, guess, options, keep_off)
+    if not optimum.converged or keeps_torque_limits(problem, times, optimum.q):
         return optimum
-    bound = _optimise(problem, times, optimum.q, options, keep_off)
+    bound = optimise(problem, times, optimum.q, options, keep_off)
     return replace(bound, solves=optimum.solves + bound.solves)
 
 
-def _optimise(problem: Problem, times: Array, guess: Array, options: GlobalOptions, keep_off: float = 0.0) -> Optimum:
+def optimise(problem: Problem, times: Array, guess: Array, options: GlobalOptions, keep_off: float = 0.0) -> Optimum:
     program = transcribe(problem, times, guess, keep_off=keep_off)
     last = len(times) == len(problem.times)
     q, outcome, iterations = program.solve(
@@ -182,13 +194,13 @@ def _clear_between(
     return replace(optimum, solves=solves)
 
 
-def stays_on_path(problem: Problem, times: Array, q: Array) -> bool:
-    """Whether the cubic spline through the knots follows the path between them, to 1 % of its length.
+def stays_on_path(problem: Problem, times: Array, q: Array, share: float = STAYS) -> bool:
+    """Whether the cubic spline through the knots follows the path between them, to a share of its length.
 
     A finite-difference program also has optima that jump to another branch of the manifold within one interval.
     """
     middle = (times[1:] + times[:-1]) / 2
     gap = problem.task.error(CubicSpline(times, q)(middle), problem.reference.position(middle))
     return bool(
-        np.linalg.norm(gap[:, : len(problem.task.axes)], axis=1).max() <= 0.01 * problem.reference.geometry.length
+        np.linalg.norm(gap[:, : len(problem.task.axes)], axis=1).max() <= share * problem.reference.geometry.length
     )

@@ -1,7 +1,8 @@
 """The interpolation-based Global Kinematic Planner (Global paper Section 3): many coarse starts, every optimum refined.
 
-Initial configurations and a population of motions are drawn and ranked (`search/population.py`), the best diverse ones are
-optimised on a coarse grid, and each distinct optimum is carried to the wanted knots by cubic splines, halving the step.
+Initial configurations and a population of motions are drawn and ranked (`search/population.py`), the best diverse ones
+are optimised on a coarse grid, and each distinct optimum is carried to the wanted knots by cubic splines, halving the
+step.
 """
 
 from __future__ import annotations
@@ -15,7 +16,8 @@ from scipy.interpolate import CubicSpline
 from pipeline.common.arrays import Array
 from pipeline.config.methods import GlobalOptions
 from pipeline.methods import dynamic_programming
-from pipeline.methods.global_planner.optimum import Optimum, optimise_start, refine
+from pipeline.methods.global_planner.batch import Batch
+from pipeline.methods.global_planner.optimum import Optimum, go_on, optimise_start, refine
 from pipeline.methods.method import ANY, Context, Method
 from pipeline.model.kinematics import wrap
 from pipeline.problem.limits import LIMIT_KINDS
@@ -24,15 +26,30 @@ from pipeline.problem.solution import Solution, Status, Trajectory
 from pipeline.program.feasibility import Relaxed, least_violation
 from pipeline.search.configurations import starting_points
 from pipeline.search.population import population, ranking
+from pipeline.search.roadmap import Roadmap
 from pipeline.search.selection import distinct, diverse
+
+STARTS = {
+    "roadmap": ("roadmap",),
+    "population": ("population",),
+    "dynamic_programming": ("dynamic_programming",),
+    "both": ("population", "dynamic_programming"),
+}
+
 
 TRACKING = 1e-8  # [m] what an optimum must keep at every knot
 
 
-ELASTIC_STARTS = 3  # from how many motions the least violation is sought when no motion is feasible
+ELASTIC_STARTS = 3  # from how many motions IPOPT seeks a motion, and the least violation, when Newton found none
 
 
 FEWER = 12  # starts on a finer grid after none succeeded on the coarse one
+
+
+STEPS = 25  # intervals of the coarsest grid: 12 miss optima
+
+
+STEPS_ALONE = 12  # where each start costs a solve of its own
 
 
 HOPELESS = 0.1  # relative violation on a coarse grid from which on finer ones are not tried
@@ -40,14 +57,17 @@ HOPELESS = 0.1  # relative violation on a coarse grid from which on finer ones a
 
 def solve(problem: Problem, options: GlobalOptions, context: Context) -> list[Solution]:
     """All distinct optima found, best first."""
-    grids = refinement(problem.times, options.coarse_steps)
+    why = Batch.without(problem, options)
+    grids = refinement(problem.times, options.coarse_steps or (STEPS if why is None else STEPS_ALONE))
     motions, log = _starts(problem, grids[0], options, np.random.default_rng(context.seed))
     if not len(motions):
-        message = "no candidate could follow the path from its start to its end: it leaves the reach of the arm"
+        message = "none of the motions that were drawn follows the path to its end; it may leave the reach of the arm"
         return [_nothing(problem, Status.INFEASIBLE, message, log)]
 
+    batch = Batch(problem, options) if why is None else None
+    log["solver"] = "newton, confirmed by ipopt" if why is None else f"ipopt ({why})"
     while True:
-        starts = _optimise_starts(problem, grids[0], options, motions, context)
+        starts = _optimise_starts(problem, grids[0], options, motions, batch, context)
         if any(start.converged for start in starts):
             break
         relaxed = _relaxed(problem, grids[0], motions)
@@ -67,7 +87,7 @@ def solve(problem: Problem, options: GlobalOptions, context: Context) -> list[So
         for start in starts
     ]
     basins = [starts[index] for index in _basins(problem, starts, options)]
-    refined = context.workers.map(refine, (problem, grids, options), basins)
+    refined = _refine_all(problem, grids, options, basins, batch, context)
     found = [(fine, coarse) for fine, coarse in zip(refined, basins, strict=True) if fine.converged and fine.continuous]
     log["jumping_optima"] = sum(fine.converged and not fine.continuous for fine in refined)
     if not found:
@@ -92,10 +112,10 @@ def solve(problem: Problem, options: GlobalOptions, context: Context) -> list[So
 
 def refuses(problem: Problem, options: GlobalOptions) -> str | None:
     """Starts by dynamic programming serve only what that method serves."""
-    if options.starts == "population":
+    if "dynamic_programming" not in STARTS[options.starts]:
         return None
     why = dynamic_programming.dynamic_programming.why_not(problem)
-    return why and f"method.global.starts = {options.starts}: {why}; starts = population serves every problem"
+    return why and f"method.global.starts = {options.starts}: {why}; starts = roadmap serves every problem"
 
 
 global_planner = Method("global", "Global optimum", "#2F855A", GlobalOptions, ANY, solve, refuses)
@@ -118,7 +138,17 @@ def _starts(
     parts: list[Array] = []
     log: dict[str, Any] = {}
     revolute = problem.task.arm.description.revolute
-    if options.starts != "dynamic_programming":
+    wanted = STARTS[options.starts]
+    if "roadmap" in wanted and problem.task.arm.base.count:
+        wanted = ("population",)
+        log["roadmap"] = "not for a base that moves or is held: population instead"
+    if "roadmap" in wanted:
+        paths = Roadmap(options.nodes, options.layers, options.optimised).starts(problem, coarse, rng)
+        log["roadmap_paths"] = len(paths)
+        parts.append(paths)
+        if not len(paths):  # nothing within the limits or clear of obstacles: what comes nearest is the solver's to say
+            wanted = ("population",)
+    if "population" in wanted:
         configurations = starting_points(problem, options.configurations, rng, options.draw)
         count = options.candidates or (len(coarse) * problem.task.arm.n) ** 2
         motions = population(problem, coarse, configurations, count, rng)
@@ -126,7 +156,7 @@ def _starts(
         if len(motions):
             costs = ranking(problem, coarse, motions, options.limit_weight)
             parts.append(motions[diverse(motions, costs, options.optimised, options.same_path, revolute)])
-    if options.starts != "population":
+    if "dynamic_programming" in wanted:
         paths = dynamic_programming.starts(problem, coarse)
         log["dynamic_programming_paths"] = len(paths)
         parts.append(paths)
@@ -135,7 +165,7 @@ def _starts(
 
 
 def _optimise_starts(
-    problem: Problem, grid: Array, options: GlobalOptions, motions: Array, context: Context
+    problem: Problem, grid: Array, options: GlobalOptions, motions: Array, batch: Batch | None, context: Context
 ) -> list[Optimum]:
     best = np.inf
 
@@ -144,7 +174,43 @@ def _optimise_starts(
         best = min(best, optimum.cost) if optimum.converged else best
         context.progress(count, len(motions), best)
 
-    return context.workers.map(optimise_start, (problem, grid, options), list(motions), done)
+    if batch is None:
+        return context.workers.map(optimise_start, (problem, grid, options), list(motions), done)
+    firsts = batch.coarse(grid, motions)
+    if not any(first.converged for first in firsts):
+        # IPOPT's restoration leaves motions that break limits for others farther away.
+        return _optimise_starts(problem, grid, options, motions[:ELASTIC_STARTS], None, context)
+    if batch.first is problem:
+        for count, first in enumerate(firsts, 1):
+            done(count, first)
+        return firsts
+    # Where starts have come to the same motion, one of them goes on for all.
+    solved = [first for first in firsts if first.converged]
+    chosen = [solved[index] for index in _distinct(solved, options, problem)]
+    further = context.workers.map(go_on, (problem, grid, options), chosen, done)
+    return [further[_nearest(problem, first, chosen)] if first.converged else first for first in firsts]
+
+
+def _nearest(problem: Problem, optimum: Optimum, others: list[Optimum]) -> int:
+    """Which of the others' motions is nearest."""
+    apart = wrap(np.array([other.q for other in others]) - optimum.q, problem.task.arm.description.revolute)
+    return int(np.abs(apart).max(axis=(1, 2)).argmin())
+
+
+def _refine_all(
+    problem: Problem,
+    grids: list[Array],
+    options: GlobalOptions,
+    basins: list[Optimum],
+    batch: Batch | None,
+    context: Context,
+) -> list[Optimum]:
+    """Every basin on the last grid: in one batch, and those that it does not finish one by one."""
+    alone = batch is None or problem.objective.second_order
+    refined = [None] * len(basins) if batch is None or alone else batch.refine(grids, basins)
+    left = [basin for basin, optimum in zip(basins, refined, strict=True) if optimum is None]
+    others = iter(context.workers.map(refine, (problem, grids, options), left))
+    return [next(others) if optimum is None else optimum for optimum in refined]
 
 
 def _basins(problem: Problem, starts: list[Optimum], options: GlobalOptions) -> list[int]:

@@ -24,7 +24,7 @@ def window_objective(problem: Problem, named: str) -> Objective:
 def solve_window(
     problem: Problem, times: Array, guess: Array, tolerance: float
 ) -> tuple[Array, float, ipopt.Outcome, int]:
-    """The motion (h + 1, n) of least objective from problem.q_init and qd_init over the knots `times`; guess (h + 1, n)."""
+    """The motion of least objective from problem.q_init and qd_init over `times` (h + 1,), as the guess (h + 1, n)."""
     program = transcribe(problem, times, guess)
     q, outcome, iterations = program.solve(tolerance=tolerance, max_iterations=MOST_ITERATIONS)
     return q, float(objective_values(problem, times, q[None])[0]), outcome, iterations

@@ -1,8 +1,9 @@
 """PMKE, predictive minimisation of kinetic energy (PMKE paper, Table 1): look h steps ahead, follow in the null space.
 
 Every update interval I the kinetic-energy integral over the next h knots, Delta T apart, is minimised (eq. (4)); the
-pseudoinverse follows the path while the null space follows the predicted joint motion (eq. (2), step 7). An objective of
-other terms of first order (`problem/lagrangian.py`) takes the kinetic energy's place, and squared torques if asked for.
+pseudoinverse follows the path while the null space follows the predicted joint motion (eq. (2), step 7). An objective
+of other terms of first order (`problem/lagrangian.py`) takes the kinetic energy's place, and squared torques if asked
+for.
 Limits and obstacles are not seen: `receding.py` is for them.
 """
 
@@ -30,7 +31,7 @@ from pipeline.program import ipopt
 
 
 def solve(problem: Problem, options: PmkeOptions, context: Context) -> list[Solution]:
-    """Steps 1-10 of Table 1 from q_init. Statistics hold one entry per prediction: time, wall time, iterations, status."""
+    """Steps 1-10 of Table 1 from q_init. Statistics: one entry per prediction, time, wall time, iterations, status."""
     return [_follow(problem, options)]
 
 
@@ -76,7 +77,10 @@ def _follow(problem: Problem, options: PmkeOptions) -> Solution:
     solution = watch.judge("pmke", Trajectory(time, q), statistics)
     failed = [entry for entry in predictor.log if not entry["converged"]]
     if failed and solution.status is Status.SOLVED:
-        message = f"{len(failed)} of {len(predictor.log)} predictions did not converge, the first at t = {failed[0]['time']:.2f} s ({failed[0]['status']})"
+        message = (
+            f"{len(failed)} of {len(predictor.log)} predictions did not converge, the first at "
+            f"t = {failed[0]['time']:.2f} s ({failed[0]['status']})"
+        )
         return Solution("pmke", solution.trajectory, Status.NOT_CONVERGED, message, statistics=statistics)
     return solution
 
@@ -136,8 +140,8 @@ class _Predictor:
     def _lifted(
         self, now: float, knots: Array, q: Array, qd: Array, guess: Array
     ) -> tuple[Array, float, ipopt.Outcome, int]:
-        """The prediction by the planner's program: squared torques, whose accelerations tie it to the velocity qd that the
-        arm has now, or a base that conserves momentum.
+        """The prediction by the planner's program: squared torques, whose accelerations tie it to the velocity qd that
+        the arm has now, or a base that conserves momentum.
         """
         times = np.concatenate([[now], knots])
         window = replace(

@@ -2,8 +2,8 @@
 
 Every update interval the motion over the next h knots is optimised from the present position and velocity, within the
 position, velocity, torque and power limits and clear of the obstacles (`program/`); its first knots are
-executed as they are, so that the executed motion keeps the limits at its knots. A few coarse knots carry the window on to
-the end of the path: a horizon alone runs into dead ends, where the limits leave no way on.
+executed as they are, so that the executed motion keeps the limits at its knots. A few coarse knots carry the window on
+to the end of the path: a horizon alone runs into dead ends, where the limits leave no way on.
 Before anything moves the global planner makes a rough plan of the whole, from which the first window starts. If a later
 window has no solution, the rest of the last plan is followed; when that is used up too, the method gives up and says
 where.

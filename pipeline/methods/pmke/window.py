@@ -43,7 +43,7 @@ class Window:
     def solve(
         self, q_start: Array, x_ref: Array, guess: Array, *, tolerance: float = 1e-8, **options: Any
     ) -> tuple[Array, float, ipopt.Outcome, int]:
-        """From q_start (n,) through x_ref (h, m), starting at guess (h, n): q (h, n), the objective, outcome, iterations."""
+        """From q_start (n,) through x_ref (h, m), started at guess (h, n): q (h, n), objective, outcome, iterations."""
         self._rows.forget()
         velocity = np.diff(np.vstack([q_start, guess]), axis=0) / self.dt
         metric = self.lagrangian.metric(guess)

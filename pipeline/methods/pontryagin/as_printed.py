@@ -1,7 +1,7 @@
 """The maximum principle as the Pontryagin report prints it, integrated as it stands.
 
-Eqs (21), (22), Euler steps from lambda(0) = 2 J+ xd, the transversality condition eq. (12) taken at the start. It belongs
-to the end where q is free: with q(0) given, (I - J+J) lambda(T) = 0 and lambda(0) is unknown (`boundary_value.py`). The
+Eqs (21), (22), Euler steps from lambda(0) = 2 J+ xd, the transversality condition eq. (12) taken at the start. It is of
+the end where q is free: with q(0) given, (I - J+J) lambda(T) = 0 and lambda(0) is unknown (`boundary_value.py`). The
 report also adds k0 w to what it minimises, so that w is made small.
 """
 

@@ -1,7 +1,7 @@
 """Pontryagin's maximum principle as a two-point boundary-value problem, by collocation from many guesses.
 
-The conditions of `conditions.py` on [0, T] with lambda(T) = 0 (the multiplier's part may be chosen so) and q(0) given, or
-x(q(0)) = x_ref(0) and (I - J+J) lambda(0) = 0 for a free start.
+The conditions of `conditions.py` on [0, T] with lambda(T) = 0 (the multiplier's part may be chosen so) and q(0) given,
+or x(q(0)) = x_ref(0) and (I - J+J) lambda(0) = 0 for a free start.
 """
 
 from __future__ import annotations
@@ -62,8 +62,8 @@ class _Extremal:
 
 
 def solve(problem: Problem, options: PontryaginOptions, context: Context) -> list[Solution]:
-    """Every extremal found, least objective first, on problem.times. Statistics: `integral`, the objective in continuous
-    time, `transversality_start` and `_end`, `kind` (minimum or saddle) and `index`.
+    """Every extremal found, least objective first, on problem.times. Statistics: `integral`, the objective in
+    continuous time, `transversality_start` and `_end`, `kind` (minimum or saddle) and `index`.
     """
     guesses = _guesses(problem, options, np.random.default_rng(context.seed))
     best = np.inf
@@ -117,8 +117,8 @@ def _guesses(problem: Problem, options: PontryaginOptions, rng: np.random.Genera
 
 
 def _shots(problem: Problem, times: Array, starts: Array, rng: np.random.Generator) -> Array:
-    """Motions (K, N + 1, n) that keep every condition but that at the end: shot from `starts`, transversal there if they
-    are free, with random null-space velocities if there is but one; by Runge and Kutta's fourth-order steps.
+    """Motions (K, N + 1, n) that keep every condition but that at the end: shot from `starts`, transversal there if
+    they are free, with random null-space velocities if there is but one; by Runge and Kutta's fourth-order steps.
     """
     lagrangian, n = Lagrangian(problem.task, problem.objective), problem.task.arm.n
     q = np.resize(starts, (SHOTS, n)) if len(starts) == 1 else starts

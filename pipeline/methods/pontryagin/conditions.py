@@ -1,4 +1,4 @@
-"""The necessary conditions of Pontryagin's maximum principle for qd = J_G+ xd + (I - J_G+ J) u and L = 1/2 qd' G qd - k0 w.
+"""Necessary conditions of Pontryagin's maximum principle for qd = J_G+ xd + (I - J_G+ J) u and L = 1/2 qd' G qd - k0 w.
 
 With the Hamiltonian H = -L + lambda' qd (report eq. (7)) and lambda = G qd + J' mu, the control that maximises it gives
 
@@ -6,8 +6,8 @@ With the Hamiltonian H = -L + lambda' qd (report eq. (7)) and lambda = G qd + J'
     lambdad = -dH/dq = dL/dq + Jd' mu,               mu = J_G+' (lambda - G qd).
 
 These are the report's eqs (20) and (17) for G = 2 I, but for the sign of k0 w: J f = xd for every q turns
-(df/dq)' J' mu into -Jd' mu, so that no pseudoinverse has to be differentiated. mu is free: what it adds to lambda, J' mu,
-never reaches qd. A solution is told by its projection on the null space, t' lambda with t tangent to the self-motion.
+(df/dq)' J' mu into -Jd' mu, so that no pseudoinverse is differentiated. mu is free: what it adds to lambda, J' mu,
+never reaches qd. A solution is told by t' lambda, its projection on the null space, t tangent to the self-motion.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ def null_space(jacobian: Array) -> Array:
 
 
 def transversality(lagrangian: Lagrangian, q: Array, costate: Array) -> float:
-    """|(I - J+ J) lambda| at one end, q, lambda (n,): zero where q is free on its self-motion manifold (report eq. (12))."""
+    """|(I - J+ J) lambda| at an end, q, lambda (n,): zero if q is free on its self-motion manifold (report, (12))."""
     basis = null_space(lagrangian.task.jacobian(q[None]))[0]
     return float(np.linalg.norm(basis.T @ costate))
 

@@ -7,7 +7,7 @@ import pytest
 from scipy.interpolate import BSpline
 
 from pipeline.common.arrays import Array
-from pipeline.config.methods import PmkeOptions
+from pipeline.config.methods import LsvOptions, PmkeOptions
 from pipeline.evaluation.evaluation import evaluate
 from pipeline.methods.lsv import lsv
 from pipeline.methods.pmke import predictive
@@ -40,7 +40,7 @@ def test_predictions_are_on_the_path_and_join_the_motion(
     problem: Make, predictions: Seen, horizon: int, interpolation: str
 ) -> None:
     asked = problem(1, 100)
-    solution = pmke(asked, PmkeOptions(dt=0.02, horizon=horizon, interpolation=interpolation))[0]
+    solution = pmke(asked, PmkeOptions(dt=0.05, horizon=horizon, interpolation=interpolation))[0]
     result = evaluate(asked, solution)
     assert result.status is Status.SOLVED
     log = solution.statistics["predictions"]
@@ -52,7 +52,7 @@ def test_predictions_are_on_the_path_and_join_the_motion(
     for times, points, qd, qdd, spline in predictions:
         assert len(times) == horizon + 1
         np.testing.assert_allclose(asked.task.value(points[1:]), asked.reference.position(times[1:]), atol=1e-8)
-        np.testing.assert_array_equal(points[0], motion.q[round(times[0] / 0.02)])
+        np.testing.assert_array_equal(points[0], motion.q[round(times[0] / 0.05)])
         np.testing.assert_allclose(spline(times), points, atol=1e-9)
         np.testing.assert_allclose(spline(times[0], 1), qd, atol=1e-9)
         np.testing.assert_allclose(spline(times[-1], 1), 0.0, atol=1e-9)
@@ -60,7 +60,7 @@ def test_predictions_are_on_the_path_and_join_the_motion(
             np.testing.assert_allclose(spline(times[0], 2), qdd, atol=1e-8)
             np.testing.assert_allclose(spline(times[-1], 2), 0.0, atol=1e-8)
     # Looking ahead pays: this motion costs LSV half as much again.
-    baseline = evaluate(asked, lsv(asked)[0]).energy_integral[-1]
+    baseline = evaluate(asked, lsv(asked, LsvOptions(dt=0.05))[0]).energy_integral[-1]
     assert result.energy_integral[-1] < (0.9 if horizon == 1 else 0.75) * baseline
 
 
@@ -100,7 +100,7 @@ def test_a_prediction_at_every_step(problem: Make, update: float) -> None:
     log = solution.statistics["predictions"]
     np.testing.assert_allclose([entry["time"] for entry in log], np.arange(81) / 10, atol=1e-9)
     assert solution.status is Status.SOLVED
-    baseline = evaluate(asked, lsv(asked)[0]).energy_integral[-1]
+    baseline = evaluate(asked, lsv(asked, LsvOptions(dt=0.05))[0]).energy_integral[-1]
     assert 5.96e-4 < evaluate(asked, solution).energy_integral[-1] < 0.8 * baseline
 
 
@@ -112,7 +112,7 @@ def test_an_update_interval_beyond_the_motion_predicts_once(problem: Make) -> No
 def test_the_gain_takes_the_drift_away(problem: Make) -> None:
     asked = problem(2, 100)
     free, held = (
-        evaluate(asked, pmke(asked, PmkeOptions(dt=0.02, gain=k))[0]).tracking_error.max() for k in (0.0, 10.0)
+        evaluate(asked, pmke(asked, PmkeOptions(dt=0.05, gain=k))[0]).tracking_error.max() for k in (0.0, 10.0)
     )
     assert held < 0.3 * free
 

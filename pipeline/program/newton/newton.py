@@ -1,0 +1,316 @@
+"""Many motions at once to their local optima: a Newton method on the path, an interior point within limits.
+
+Each iteration serves all starts and all knots with one call of the kernel.
+
+1. exact gradient and block-tridiagonal Hessian (`motion.py`), plus the path's curvature by its multipliers;
+2. per knot J' = Y R and the null space Z: the step onto the path is -Y R^-T e, the multipliers are -R^-1 Y'g, and what
+   is left is Z'HZ, N r unknowns in a narrow band (Nocedal and Wright 2006, Section 18.3), solved by Cholesky. Where it
+   is not positive definite it fades into the stiffness M/dt, which always is;
+3. limits c >= 0 by a primal-dual interior point (Nocedal and Wright, chapter 19) with slacks s and, so that a start
+   beyond its limits is none the worse, an excess t that costs PENALTY each: c + t = s, z s = mu, (PENALTY - z) t = mu.
+   All this is diagonal: the band stays. Where an excess remains, no motion near the start keeps the limits;
+4. full steps are the rule; others are searched with the filter of Waechter and Biegler (2006), each trial bent back
+   onto the path (a second-order correction);
+5. a start that has converged, or whose steps vanish, leaves the batch.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.common.arrays import Array
+from pipeline.problem.limits import Limits
+from pipeline.program.newton import triangular
+from pipeline.program.newton.banded import Banded
+from pipeline.program.newton.bounds import Bounds
+from pipeline.program.newton.motion import Motions, PerStart, Point
+
+FILTER = 16  # entries of each start's filter
+NEAR = 1e-7  # relative: where rounding decides, a full step is taken without question
+LONGEST = 0.7  # [rad] of a step at any joint and knot
+ON_PATH = 1e-5  # [m, rad] from where the last step is taken
+BARRIER_END = 1e-10
+COMPLEMENTARITY = 10.0  # times BARRIER_END: how far products of slack and multiplier may be from it
+FEASIBLE = 1e-9
+PENALTY = 1e3  # of an excess [rad], in units of the start's cost: multipliers of limits that can be kept are smaller
+BEYOND = 1e-6  # [rad] of excess that remains: infeasible
+SHORT, PATIENCE = 1e-3, 3  # more than so many steps shorter than this: lost
+TRIALS = 10
+
+
+@dataclass(frozen=True)
+class Barrier:
+    """Where the interior point begins: the barrier parameter, and slacks of at least `push` of their width."""
+
+    mu: float = 1e-2
+    push: float = 1e-2
+
+
+COLD, WARM = Barrier(), Barrier(1e-6, 1e-3)  # warm: a spline of a coarser optimum is nearly optimal
+
+
+@dataclass
+class Answer:
+    """Per start: motions q (S, N + 1, n), cost (S,), converged, iterations (S,), the largest error of the path (S,),
+    and wall_time [s] of all.
+    """
+
+    q: Array
+    cost: Array
+    converged: NDArray[np.bool_]
+    iterations: NDArray[np.int_]
+    residual: Array
+    wall_time: float = 0.0
+
+
+@dataclass
+class State(PerStart):
+    """One iterate of every start: unknowns, slacks and multipliers of limits, the barrier, the filter."""
+
+    number: NDArray[np.int_]
+    x: Array
+    begin: Array
+    scale: Array
+    slack: Array
+    excess: Array
+    z: Array
+    mu: Array
+    seen_theta: Array
+    seen_phi: Array
+    short: NDArray[np.int_]
+    point: Point
+
+    def take(self, rows: NDArray[Any]) -> State:
+        point, self.point = self.point, self.number  # type: ignore[assignment]
+        part = super().take(rows)
+        part.point, self.point = point.take(rows), point
+        return part
+
+
+@dataclass
+class Step(PerStart):
+    """A direction: d (S, U, n), changes of slack, excess and multipliers (S, L), the predicted decrease; and of the
+    iterate the merit phi with its slope, and what is missed of path and slacks, theta.
+    """
+
+    d: Array
+    slack: Array
+    excess: Array
+    z: Array
+    decrement: Array
+    slope: Array
+    theta: Array
+    phi: Array
+
+
+class Newton:
+    """Solves motions of one task on one grid; `limits`: of positions and velocities."""
+
+    def __init__(self, motions: Motions, limits: Limits) -> None:
+        self.motions, self.knots = motions, motions.knots
+        self.bounds = Bounds(self.knots, limits)
+        self.band = Banded(self.knots.count, motions.n - motions.m, self.knots.cyclic)
+
+    def solve(self, q: Array, barrier: Barrier = COLD, *, tolerance: float = 1e-10, max_iterations: int = 60) -> Answer:
+        """From motions q (S, N + 1, n); never raises for a start that fails."""
+        with np.errstate(all="ignore"):  # a start at a singularity fails alone
+            begin = time.perf_counter()
+            answer = self._solve(np.array(q, dtype=float), barrier, tolerance, max_iterations)
+            answer.wall_time = time.perf_counter() - begin
+            return answer
+
+    def _solve(self, q: Array, barrier: Barrier, tolerance: float, max_iterations: int) -> Answer:
+        count = len(q)
+        unknown = np.full(count, np.inf)
+        answer = Answer(q, unknown.copy(), np.zeros(count, bool), np.zeros(count, int), unknown.copy())
+        if not count:
+            return answer
+        state = self._begin(q, barrier)
+        for iteration in range(1, max_iterations + 1):
+            step = self._direction(state)
+            done = self._converged(state, step, tolerance)
+            lost = ~np.isfinite(step.decrement) | self._infeasible(state, step, tolerance)
+            state = self._advance(state, step, done | lost)
+            lost |= ~np.isfinite(state.point.cost) | (state.short > PATIENCE)
+            finished = done | lost
+            if iteration == max_iterations:
+                finished[:] = True
+            if finished.any():
+                who = state.number[finished]
+                answer.q[who] = self.knots.whole(state.x, state.begin)[finished]
+                answer.cost[who], answer.iterations[who] = state.point.cost[finished], iteration
+                answer.residual[who] = np.abs(state.point.error[finished]).max(axis=(1, 2))
+                answer.converged[who] = (done & ~lost)[finished]
+                if finished.all():
+                    break
+                state = state.take(~finished)
+        return answer
+
+    def _begin(self, q: Array, barrier: Barrier) -> State:
+        count, begin, x = len(q), q[:, :1].copy(), self.knots.unknown(q)
+        kept, mu = self.bounds.values(x, begin), np.full(count, barrier.mu if self.bounds else 0.0)
+        slack = np.maximum(kept, barrier.push * self.bounds.width)
+        z = np.minimum(mu[:, None] / slack, PENALTY / 2)
+        point = self.motions.differentiate(x, begin)
+        empty = np.full((count, FILTER), np.inf)
+        return State(
+            number=np.arange(count),
+            x=x,
+            begin=begin,
+            scale=1.0 / np.maximum(point.cost, triangular.TINY),
+            slack=slack,
+            excess=np.maximum(slack - kept, mu[:, None] / (PENALTY - z)),
+            z=z,
+            mu=mu,
+            seen_theta=empty,
+            seen_phi=empty.copy(),
+            short=np.zeros(count, int),
+            point=point,
+        )
+
+    # --- the direction ------------------------------------------------------------------------------------------
+
+    def _direction(self, state: State) -> Step:
+        point, bounds, knots = state.point, self.bounds, self.knots
+        scale, mu = state.scale[:, None, None], state.mu[:, None]
+        YT, ZT = point.Y.swapaxes(-1, -2), point.Z.swapaxes(-1, -2)
+        gradient = point.gradient * scale
+        lack = self._lack(state) if bounds else state.slack
+        towards = gradient - bounds.pull(state.z) if bounds else gradient
+        multipliers = triangular.backward(point.R, -(YT @ towards[..., None])[..., 0])
+        diagonal = point.diagonal * scale[..., None] + self.motions.curvature(point, multipliers)
+        off, stiff, stiff_off = (a * scale[..., None] for a in (point.off, point.stiff, point.stiff_off))
+        driven = gradient
+        if bounds:
+            other = PENALTY - state.z
+            sigma = 1 / (state.slack / state.z + state.excess / other)
+            off_centre = lack - mu / state.z + state.slack + mu / other - state.excess
+            on, above = bounds.weigh(sigma)
+            joint = np.arange(self.motions.n)
+            diagonal[..., joint, joint] += on
+            stiff[..., joint, joint] += on
+            off[..., joint, joint] += above
+            stiff_off[..., joint, joint] += above
+            driven = gradient - bounds.pull(state.z - sigma * off_centre)
+        onto = -(point.Y @ triangular.forward(point.R, point.error)[..., None])[..., 0]
+        right = -(ZT @ (driven + knots.product(diagonal, off, onto))[..., None])[..., 0]
+        within = self._reduced(point.Z, (diagonal, off), (stiff, stiff_off), right)
+        d = onto + (point.Z @ within[..., None])[..., 0]
+        theta = np.abs(point.error).sum(axis=(1, 2))
+        slope, phi = (gradient * d).sum(axis=(1, 2)), point.cost * state.scale
+        slack_step = excess_step = z_step = state.slack
+        if bounds:
+            z_step = -sigma * (bounds.change(d) + off_centre)
+            slack_step = (mu - state.slack * z_step) / state.z - state.slack
+            excess_step = (mu + state.excess * z_step) / other - state.excess
+            theta = theta + np.abs(lack).sum(axis=1)
+            phi = phi + self._barrier(state.slack, state.excess, state.mu)
+            slope = slope - state.mu * (slack_step / state.slack + excess_step / state.excess).sum(axis=1)
+            slope = slope + PENALTY * excess_step.sum(axis=1)
+        decrement = np.abs((right * within).sum(axis=(1, 2)))
+        return Step(d, slack_step, excess_step, z_step, decrement, slope, theta, phi)
+
+    def _lack(self, state: State) -> Array:
+        return self.bounds.values(state.x, state.begin) + state.excess - state.slack
+
+    @staticmethod
+    def _barrier(slack: Array, excess: Array, mu: Array) -> Array:
+        return np.asarray(PENALTY * excess.sum(axis=1) - mu * (np.log(slack) + np.log(excess)).sum(axis=1))
+
+    def _reduced(self, Z: Array, blocks: tuple[Array, Array], stiff: tuple[Array, Array], right: Array) -> Array:
+        """The step (S, U, r) in the null spaces."""
+        matrices = self.band.assemble(*self.knots.reduce(Z, *blocks))
+        positive = self.band.assemble(*self.knots.reduce(Z, *stiff))
+        # Where nothing holds the start, a uniform motion costs the stiffness nothing.
+        positive[:, :, -1] += 1e-4 * positive[:, :, -1].mean(axis=1, keepdims=True)
+        return self.band.solve(matrices, positive, right)[0]
+
+    def _converged(self, state: State, step: Step, tolerance: float) -> NDArray[np.bool_]:
+        done = (step.decrement < tolerance) & (np.abs(state.point.error).max(axis=(1, 2)) < ON_PATH)
+        if self.bounds:
+            gap = np.abs(state.slack * state.z - state.mu[:, None]).max(axis=1)
+            lack = np.maximum(np.abs(self._lack(state)), state.excess).max(axis=1)
+            done &= (gap < COMPLEMENTARITY * BARRIER_END) & (state.mu <= BARRIER_END) & (lack < FEASIBLE)
+        return done
+
+    def _infeasible(self, state: State, step: Step, tolerance: float) -> NDArray[np.bool_]:
+        beyond = state.excess.max(axis=1, initial=0.0) > BEYOND
+        return (step.decrement < tolerance) & (state.mu <= BARRIER_END) & beyond if self.bounds else beyond
+
+    # --- the step -----------------------------------------------------------------------------------------------
+
+    def _advance(self, state: State, step: Step, last: NDArray[np.bool_]) -> State:
+        """The next iterate. The whole next point is computed at once, since full steps are the rule."""
+        towards = np.maximum(0.99, 1 - state.mu)
+        reach = np.ones(len(state.x))
+        if self.bounds:
+            reach = np.minimum(
+                _fraction(state.slack, step.slack, towards), _fraction(state.excess, step.excess, towards)
+            )
+        alpha = np.minimum(reach, LONGEST / np.maximum(np.abs(step.d).max(axis=(1, 2)), triangular.TINY))
+        alpha = np.where(np.isfinite(alpha), alpha, 0.0)
+        trial = state.x + alpha[:, None, None] * step.d
+        point = self.motions.differentiate(trial, state.begin)
+        refused = self._refused(state, step, alpha, trial, point.cost, point.error) & ~last
+        searched = bad = np.flatnonzero(refused)
+        for _ in range(TRIALS):
+            if not len(bad):
+                break
+            part, direction = state.take(bad), step.take(bad)
+            straight = part.x + alpha[bad, None, None] * direction.d
+            missed = self.motions.value(straight, part.begin)[1]
+            bent = straight - (part.point.Y @ triangular.forward(part.point.R, missed)[..., None])[..., 0]
+            trial[bad] = bent
+            again = self._refused(part, direction, alpha[bad], bent, *self.motions.value(bent, part.begin))
+            bad = bad[again]
+            alpha[bad] *= 0.4
+        if len(searched):
+            point.put(searched, self.motions.differentiate(trial[searched], state.begin[searched]))
+        slack, excess, z, mu = state.slack, state.excess, state.z, state.mu
+        theta, phi = state.seen_theta, state.seen_phi
+        oldest = np.where(step.theta > FEASIBLE, step.theta, np.inf)
+        theta, phi = np.roll(theta, 1, axis=1), np.roll(phi, 1, axis=1)
+        theta[:, 0], phi[:, 0] = oldest, step.phi
+        if self.bounds:
+            slack, excess = slack + alpha[:, None] * step.slack, excess + alpha[:, None] * step.excess
+            dual = np.minimum(_fraction(z, step.z, towards), _fraction(PENALTY - z, -step.z, towards))
+            z = z + dual[:, None] * step.z
+            # complementarity within a factor of its target (Waechter and Biegler, eq. (16))
+            z = np.clip(z, 1e-10 * mu[:, None] / slack, np.minimum(1e10 * mu[:, None] / slack, (1 - 1e-12) * PENALTY))
+            near = np.abs(state.point.error).max(axis=(1, 2)) < 1e-4
+            solved = (step.decrement < 10 * mu) & near & (alpha > 0.3)
+            mu = np.where(solved, np.maximum(BARRIER_END, np.minimum(0.1 * mu, mu**1.7)), mu)
+            theta[mu < state.mu] = np.inf  # another barrier, another filter
+        short = np.where(alpha < SHORT, state.short + 1, 0)
+        return State(state.number, trial, state.begin, state.scale, slack, excess, z, mu, theta, phi, short, point)
+
+    def _refused(self, state: State, step: Step, alpha: Array, trial: Array, cost: Array, error: Array) -> NDArray[Any]:
+        """Whether a trial neither lowers cost nor what is missed, against the iterate and against its filter."""
+        theta, phi = np.abs(error).sum(axis=(1, 2)), cost * state.scale
+        if self.bounds:
+            slack, excess = (
+                a + alpha[:, None] * b for a, b in ((state.slack, step.slack), (state.excess, step.excess))
+            )
+            theta = theta + np.abs(self.bounds.values(trial, state.begin) + excess - slack).sum(axis=1)
+            phi = phi + self._barrier(slack, excess, state.mu)
+        rounding = 1e-10 * np.maximum(1.0, np.abs(step.phi))
+        descent = (step.slope < 0) & (step.theta < 1e-4) & (theta < 1e-4)
+        armijo = phi <= step.phi + 1e-4 * alpha * step.slope + rounding
+        better = (theta <= (1 - 1e-5) * step.theta) | (phi <= step.phi - 1e-5 * step.theta + rounding)
+        seen = (theta[:, None] <= (1 - 1e-5) * state.seen_theta) | (
+            phi[:, None] <= state.seen_phi - 1e-5 * state.seen_theta
+        )
+        seen |= np.isinf(state.seen_theta)
+        near = (step.decrement < NEAR) & (step.theta < NEAR) & (theta < NEAR)
+        return np.asarray(~((np.where(descent, armijo, better) & seen.all(axis=1)) | near))
+
+
+def _fraction(values: Array, change: Array, towards: Array) -> Array:
+    """Per start the longest step (S,) that leaves 1 - `towards` of all values (S, L)."""
+    ratio = np.where(change < 0, -towards[:, None] * values / change, np.inf)
+    return np.asarray(np.minimum(1.0, ratio.min(axis=1, initial=np.inf)))

@@ -1,0 +1,136 @@
+"""Starts for any redundancy: a layered graph of configurations on the self-motion manifolds of some points of the path.
+
+Half of each layer's nodes are uniform joint angles put onto the manifold, which reach every branch; the other half are
+carried along the whole path from some layers by inertia-weighted steps, which stay on a branch. An edge costs
+1/2 d'G d/dt with the objective's metric G at both ends. The cheapest path through every node is a start; cheap ones
+that are far apart are priced on the first grid, and of those again the cheap ones that are far apart remain.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.common.arrays import Array
+from pipeline.problem.problem import Boundary, Problem
+from pipeline.search.layers import Edges, closed_paths, through_every_node
+from pipeline.search.manifold import Manifold
+from pipeline.search.selection import diverse
+
+SLACK = 1.15  # times the velocity limits: a coarse step's mean may be a little above them
+PRICED = 3  # times as many starts are priced on the first grid as are kept
+APART = 0.1  # [rad]: starts are not closer than half of this
+CLOSED = 1e-6  # [rad]
+
+
+@dataclass(frozen=True)
+class Roadmap:
+    """Sizes: nodes per layer, layers after the first, motions that are returned at most."""
+
+    nodes: int = 300
+    layers: int = 6
+    most: int = 64
+
+    def starts(self, problem: Problem, grid: Array, rng: np.random.Generator) -> Array:
+        """Motions (P, N + 1, n) on the knots `grid`, on the path at every knot, cheapest first; P may be 0."""
+        manifold = Manifold(problem)
+        none = np.empty((0, len(grid), manifold.n))
+        times = np.interp(np.linspace(0, len(grid) - 1, self.layers + 1), np.arange(len(grid)), grid)
+        nodes = _Sampler(manifold, times, self.nodes, rng).layers()
+        if min(map(len, nodes)) == 0:
+            return none
+        closed = problem.boundary is Boundary.CYCLIC
+        cheapest = closed_paths if closed else through_every_node
+        paths, costs = cheapest(edge_costs(manifold, times, nodes, problem.bounds.velocity))
+        if not len(paths):  # too fast everywhere: what is nearest to the limits is for the solver to find
+            paths, costs = cheapest(edge_costs(manifold, times, nodes, np.full(manifold.n, np.inf)))
+        coarse = np.stack([layer[column] for layer, column in zip(nodes, paths.T, strict=True)], axis=1)
+        turns = np.cumsum(manifold.wrap(np.diff(coarse, axis=1)), axis=1)
+        coarse[:, 1:] = coarse[:, :1] + turns
+        if closed:  # as a motion, not only up to whole turns
+            back = np.abs(coarse[:, -1] - coarse[:, 0]).max(axis=1) < CLOSED
+            coarse, costs = coarse[back], costs[back]
+        if not len(coarse):
+            return none
+        revolute = problem.task.arm.description.revolute
+        motions = _on_grid(manifold, times, coarse[diverse(coarse, costs, PRICED * self.most, APART, revolute)], grid)
+        if not len(motions):
+            return none
+        chosen = diverse(motions, manifold.cost(grid, motions), self.most, APART, revolute)
+        return motions[chosen]
+
+
+def edge_costs(manifold: Manifold, times: Array, nodes: list[Array], velocity: Array) -> Edges:
+    """Of every pair of neighbours 1/2 d'G d/dt, G the mean of both ends' metrics; infinite beyond `velocity` (n,)."""
+    roots = [np.linalg.cholesky(manifold.metric(layer)) for layer in nodes]
+    n, edges = manifold.n, []
+    for i, dt in enumerate(np.diff(times)):
+        d = manifold.wrap(nodes[i + 1][None] - nodes[i][:, None]).transpose(2, 0, 1).astype(np.float32)
+        cost = np.zeros(d.shape[1:], np.float32)
+        for column in range(n):  # |L'd|^2 for both ends' roots
+            for root, axes in ((roots[i + 1], np.s_[None, :]), (roots[i], np.s_[:, None])):
+                part = sum(d[j] * root[:, j, column].astype(np.float32)[axes] for j in range(column, n))
+                cost += np.square(part)
+        cost *= np.float32(0.25 / dt)
+        for joint in np.flatnonzero(np.isfinite(velocity)):
+            cost[np.abs(d[joint]) > SLACK * velocity[joint] * dt] = np.inf
+        edges.append(cost)
+    return edges
+
+
+class _Sampler:
+    """The layers' nodes."""
+
+    def __init__(self, manifold: Manifold, times: Array, count: int, rng: np.random.Generator) -> None:
+        self.manifold, self.times, self.count, self.rng = manifold, times, count, rng
+        self.x, self.last = manifold.problem.reference.position(times), len(times) - 1
+        self.given = manifold.problem.q_init[None] if manifold.problem.boundary is Boundary.FIXED else None
+        self.parts: list[list[Array]] = [[] for _ in times]
+
+    def layers(self) -> list[Array]:
+        closed = self.manifold.problem.boundary is Boundary.CYCLIC
+        for layer in range(0 if self.given is None else 1, self.last if closed else self.last + 1):
+            self.parts[layer].append(self.manifold.draw(self.x[layer], self.count // 2, self.rng))
+        first = max(1, self.last // 4) if self.given is not None else 0
+        bases = sorted({first, self.last // 2, self.last})
+        for base in bases:
+            drawn = self.manifold.draw(self.x[base], max(1, self.count // 2 // len(bases)), self.rng)
+            self.parts[base].append(drawn)
+            self._carry(drawn, base, 1)
+            self._carry(drawn, base, -1)
+        if self.given is not None:
+            self._carry(self.given, 0, 1)
+            self.parts[0] = [self.given]
+        if closed:
+            self.parts[-1] = self.parts[0]
+        return [np.concatenate(part) for part in self.parts]
+
+    def _carry(self, q: Array, layer: int, direction: int) -> None:
+        """Along the path to its end, as far as the limits allow, in two steps from layer to layer."""
+        end = self.last if direction > 0 else 0 if self.given is None else 1
+        while layer != end and len(q):
+            ahead = layer + direction
+            for time in (0.5 * (self.times[layer] + self.times[ahead]), self.times[ahead]):
+                target = np.tile(self.manifold.problem.reference.position(np.array([time])), (len(q), 1))
+                if len(q):
+                    q, arrived = self.manifold.project(q, target, self.manifold.metric(q), steps=10)
+                    q = q[arrived]
+                    q = q[self.manifold.allowed(q)]
+            layer = ahead
+            self.parts[layer].append(self.manifold.home(q))
+
+
+def _on_grid(manifold: Manifold, times: Array, coarse: Array, grid: Array) -> Array:
+    """The motions (P, L + 1, n) between layers, put onto the path at the knots `grid`; without those that lose it."""
+    at = np.clip(np.searchsorted(times, grid, side="right") - 1, 0, len(times) - 2)
+    share = ((grid - times[at]) / (times[at + 1] - times[at]))[:, None]
+    q = np.clip(coarse[:, at] * (1 - share) + coarse[:, at + 1] * share, manifold.lower, manifold.upper)
+    target = np.tile(manifold.problem.reference.position(grid), (len(q), 1))
+    flat, arrived = manifold.project(q.reshape(-1, manifold.n), target, steps=12, tolerance=1e-7)
+    motions = flat.reshape(q.shape)
+    if manifold.problem.boundary is Boundary.FIXED:
+        motions[:, 0] = manifold.problem.q_init
+    if manifold.problem.boundary is Boundary.CYCLIC:
+        motions[:, -1] = motions[:, 0]
+    return motions[arrived.reshape(len(q), -1)[:, 1:].all(axis=1)]

@@ -1,0 +1,184 @@
+"""Newton's method for many motions: its parts beside dense algebra and differences, its optima beside IPOPT's."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.build.problem import prepare
+from pipeline.common.arrays import Array
+from pipeline.problem.objective import Objective
+from pipeline.problem.problem import Boundary, Problem
+from pipeline.program.confirm import confirm
+from pipeline.program.newton import triangular
+from pipeline.program.newton.banded import Banded
+from pipeline.program.newton.bounds import Bounds
+from pipeline.program.newton.knots import Knots
+from pipeline.program.newton.newton import Newton
+from pipeline.program.newton.serve import Solver, why_not
+from pipeline.search.roadmap import Roadmap
+from tests.support import composed, differences
+
+BOUNDARIES = list(Boundary)
+
+
+def dense(diagonal: Array, off: Array, cyclic: bool) -> Array:
+    """(U s, U s) of blocks (U, s, s)."""
+    count, size = diagonal.shape[:2]
+    out = np.zeros((count, size, count, size))
+    for k in range(count):
+        out[k, :, k] += diagonal[k]
+    for k, block in enumerate(off):
+        out[k, :, (k + 1) % count] += block
+        out[(k + 1) % count, :, k] += block.T
+    assert len(off) == (count if cyclic else count - 1)
+    return out.reshape(count * size, count * size)
+
+
+@pytest.mark.parametrize("cyclic", [False, True])
+@pytest.mark.parametrize("size", [1, 2, 3])
+def test_banded_systems(cyclic: bool, size: int, rng: np.random.Generator) -> None:
+    count = 7
+    diagonal = rng.normal(size=(2, count, size, size))
+    diagonal = diagonal + diagonal.swapaxes(-1, -2) + 8 * size * np.eye(size)
+    off = rng.normal(size=(2, count if cyclic else count - 1, size, size))
+    right = rng.normal(size=(2, count, size))
+    band = Banded(count, size, cyclic)
+    x, changed = band.solve(band.assemble(diagonal, off), np.empty(0), right)
+    assert changed == 0
+    for s in range(2):
+        exact = np.linalg.solve(dense(diagonal[s], off[s], cyclic), right[s].ravel())
+        np.testing.assert_allclose(x[s].ravel(), exact, atol=1e-12)
+
+
+def test_an_indefinite_system_fades_into_a_positive_one(rng: np.random.Generator) -> None:
+    band = Banded(5, 1, False)
+    bad, good = -np.ones((1, 5, 1, 1)), 2 * np.ones((1, 5, 1, 1))
+    off = np.zeros((1, 4, 1, 1))
+    right = rng.normal(size=(1, 5, 1))
+    x, changed = band.solve(band.assemble(bad, off), band.assemble(good, off), right)
+    assert changed == 1
+    np.testing.assert_allclose(x, right / (0.4 * -1 + 0.6 * 2))
+
+
+def test_null_spaces_and_triangular_systems(rng: np.random.Generator) -> None:
+    rows, b = rng.normal(size=(4, 3, 6)), rng.normal(size=(6, 3))  # J' of six knots
+    R, Q = triangular.split(rows)
+    np.testing.assert_allclose(np.einsum("ijk,ilk->kjl", Q, Q), np.tile(np.eye(4), (6, 1, 1)), atol=1e-14)
+    np.testing.assert_allclose(
+        np.einsum("ijk,jlk->ilk", Q[:, :3], np.triu(np.ones((3, 3)))[:, :, None] * R), rows, atol=1e-14
+    )
+    np.testing.assert_allclose(np.einsum("ijk,ik->jk", rows, Q[:, 3]), 0.0, atol=1e-14)
+    upper = np.triu(R.transpose(2, 0, 1))
+    np.testing.assert_allclose(triangular.backward(upper, b), np.linalg.solve(upper, b[:, :, None])[:, :, 0])
+    lower = upper.swapaxes(1, 2)
+    np.testing.assert_allclose(triangular.forward(upper, b), np.linalg.solve(lower, b[:, :, None])[:, :, 0])
+
+
+def small(boundary: Boundary, *words: str) -> Problem:
+    problem = prepare(composed("robot=planar4r", "path=circle", "path.radius=0.05", "timing.steps=6", *words))
+    objective = Objective({"kinetic_energy": 0.7, "velocity_norm": 0.02})
+    return replace(problem, boundary=boundary, objective=objective)
+
+
+@pytest.mark.parametrize("boundary", BOUNDARIES)
+def test_derivatives_of_whole_motions(boundary: Boundary, rng: np.random.Generator) -> None:
+    problem = small(boundary)
+    newton = Solver(problem).on(problem.times)
+    motions, knots, n = newton.motions, newton.knots, problem.task.arm.n
+    q = rng.normal(size=(2, len(problem.times), n))
+    x, begin = knots.unknown(q), q[:, :1]
+    point = motions.differentiate(x, begin)
+    for s in range(2):
+
+        def at(flat: Array, s: int = s) -> Array:
+            return flat.reshape(1, knots.count, n)
+
+        def cost(flat: Array, s: int = s) -> Array:
+            return motions.value(at(flat), begin[s : s + 1])[0][0]
+
+        def gradient(flat: Array, s: int = s) -> Array:
+            return motions.differentiate(at(flat), begin[s : s + 1]).gradient.ravel()
+
+        flat = x[s].ravel()
+        scale = float(np.abs(point.gradient[s]).max())
+        np.testing.assert_allclose(point.gradient[s].ravel(), differences(cost, flat), atol=1e-7 * scale)
+        hessian = dense(point.diagonal[s], point.off[s], knots.cyclic)
+        np.testing.assert_allclose(hessian, differences(gradient, flat), atol=1e-7 * np.abs(hessian).max())
+    value, error = motions.value(x, begin)
+    np.testing.assert_allclose(value, point.cost, rtol=1e-13)
+    np.testing.assert_array_equal(error, point.error)
+
+
+@pytest.mark.parametrize("boundary", BOUNDARIES)
+def test_rows_of_limits_and_their_transpose(boundary: Boundary, rng: np.random.Generator) -> None:
+    problem = small(boundary, "limits=joint")
+    lower = np.array([-1.0, -np.inf, -2.0, -3.0])
+    problem = replace(problem, limits=replace(problem.bounds, lower=lower, upper=-lower, velocity=np.full(4, 3.0)))
+    knots = Knots(boundary, problem.times)
+    bounds = Bounds(knots, problem.bounds)
+    q = rng.normal(size=(2, 7, 4))
+    x, begin = knots.unknown(q), q[:, :1]
+    whole = knots.whole(x, begin)
+    speed = np.abs(np.diff(whole, axis=1) / np.diff(problem.times)[:, None])
+    slack = np.sort(np.concatenate([3.0 - speed, 3.0 + speed], axis=1).ravel()) * problem.times[1]
+    kept = bounds.values(x, begin)
+    np.testing.assert_allclose(
+        np.sort(kept[:, np.isclose(bounds.offset, -3.0 * problem.times[1])].ravel()), slack, atol=1e-12
+    )
+    d, z = rng.normal(size=x.shape), rng.normal(size=kept.shape)
+    np.testing.assert_allclose(bounds.values(x + d, begin) - kept, bounds.change(d), atol=1e-12)
+    np.testing.assert_allclose((bounds.change(d) * z).sum(axis=1), (d * bounds.pull(z)).sum(axis=(1, 2)))
+    on, above = bounds.weigh(z)
+    blocks = on[..., None] * np.eye(4), above[..., None] * np.eye(4)
+    np.testing.assert_allclose(
+        (d * knots.product(*blocks, d)).sum(axis=(1, 2)), (z * bounds.change(d) ** 2).sum(axis=1)
+    )
+
+
+def solved(*words: str) -> tuple[Problem, Newton, Array]:
+    problem = prepare(composed(*words, "timing.steps=25"))
+    return (
+        problem,
+        Solver(problem).on(problem.times),
+        Roadmap().starts(problem, problem.times, np.random.default_rng(1)),
+    )
+
+
+@pytest.mark.parametrize("name", ["sim1", "sim2", "sim5", "traj4", "panda_pose"])
+def test_ipopt_confirms_every_optimum(name: str) -> None:
+    problem, newton, starts = solved(f"+experiment={name}")
+    answer = newton.solve(starts[:24])
+    assert answer.converged.sum() > 5
+    costs = answer.cost[answer.converged]
+    for s in np.flatnonzero(answer.converged)[[np.argmin(costs), np.argmax(costs)]]:
+        told = confirm(problem, problem.times, answer.q[s], tolerance=1e-8, max_iterations=20)
+        assert told.converged
+        assert told.iterations <= 2
+        assert told.moved < 1e-6
+        assert answer.residual[s] < 1e-9
+
+
+def test_a_start_is_solved_alone_as_among_others() -> None:
+    _, newton, starts = solved("+experiment=sim2")
+    together, alone = newton.solve(starts[:8]), newton.solve(starts[5:6])
+    assert together.converged[5]
+    np.testing.assert_allclose(alone.q[0], together.q[5], atol=1e-9)
+    assert alone.iterations[0] == together.iterations[5]
+
+
+def test_limits_that_nothing_keeps_are_not_kept_silently() -> None:
+    problem, _, starts = solved("+experiment=sim1")
+    slow = replace(problem, limits=replace(problem.bounds, velocity=np.full(3, 0.5)))
+    answer = Solver(slow).on(problem.times).solve(starts[:4])
+    assert not answer.converged.any()
+
+
+def test_what_is_not_served_has_a_reason() -> None:
+    assert why_not(prepare(composed("+experiment=sim1"))) is None
+    for name, word in (("sim3", "torque"), ("panda_obstacle", "obstacles"), ("floating3r", "base")):
+        reason = why_not(replace(prepare(composed(f"+experiment={name}")), limits=None))
+        assert reason is not None
+        assert word in reason
