@@ -79,9 +79,9 @@ def off_path(problem: Problem, plant: SinglePlant, time: Array, q: Array) -> Off
 def steps_needed(problem: Problem, time: Array, off: float, allowed: float) -> int | None:
     """How many even intervals would bring a curve, `off` [m] its path on the knots `time`, to within `allowed`.
 
-    The path itself, splined through its points at the knots, shows how that error falls with their number (as its fourth
-    power, once they resolve it); the curve's is larger by a factor, measured on the knots it has, which tells less the
-    farther it is carried. None: no number does.
+    The path itself, splined through its points at the knots, shows how that error falls with their number (as its
+    fourth power, once they resolve it); the curve's is larger by a factor, measured on the knots it has, which tells
+    less the farther it is carried. None: no number does.
     """
     count, here = len(time) - 1, _of_path(problem, len(time) - 1)
     factor = max(off / here, 1.0) if here > 0 else np.inf

@@ -218,8 +218,8 @@ def _judge(
 def _judge_between(
     problem: Problem, off: OffPath, tracking: Array, turned: Array, solution: Solution
 ) -> tuple[Status, str]:
-    """The curve that is exported: between the knots it may be off by the tolerances of the path more than at them, where
-    the method's own promise holds; and what there is to say of a cycle that winds.
+    """The curve that is exported: between the knots it may be off by the tolerances of the path more than at them,
+    where the method's own promise holds; and what there is to say of a cycle that winds.
     """
     message = solution.message
     reference, time, arm = problem.reference, solution.trajectory.time, problem.task.arm

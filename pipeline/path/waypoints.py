@@ -106,10 +106,11 @@ def _check_header(file: str | File, header: Sequence[str], axes: Sequence[str]) 
     if unknown:
         close = difflib.get_close_matches(unknown[0].lower(), known, n=1, cutoff=0.75)
         hint = f"did you mean {close[0]}? " if close else ""
+        named = ", ".join(name or "(no name)" for name in unknown)
         raise PathError(
-            f"path.file = {file}: column{'s' * (len(unknown) > 1)} {', '.join(name or '(no name)' for name in unknown)} "
-            f"not understood; {hint}needed are {', '.join(axes)}; beside them there may be {', '.join(ROLL_PITCH_YAW)} or "
-            f"{', '.join(QUATERNION)}, and {TIME}"
+            f"path.file = {file}: column{'s' * (len(unknown) > 1)} {named} not understood; {hint}needed are "
+            f"{', '.join(axes)}; beside them there may be {', '.join(ROLL_PITCH_YAW)} or {', '.join(QUATERNION)}, and "
+            f"{TIME}"
         )
 
 

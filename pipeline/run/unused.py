@@ -16,8 +16,8 @@ def require_motion(config: RunConfig) -> None:
     method = config.export.method
     if method not in ("best", "none", *config.methods):
         raise ConfigError(
-            f"export.method = {method}: that method does not run (methods = [{','.join(config.methods)}]), so that there "
-            "is nothing to export"
+            f"export.method = {method}: that method does not run (methods = [{','.join(config.methods)}]), so that "
+            "there is nothing to export"
         )
     if config.closed_loop.run and method == "none":
         raise ConfigError("closed_loop.run = true: it follows the exported motion, and export.method = none")

@@ -71,8 +71,8 @@ class Nothing(Result):
 
     def section(self) -> list[str]:
         return [
-            "Exported: nothing, since no confirmed motion keeps every limit and, to path.tolerance between its knots too, "
-            "its path (export.method names one anyway)."
+            "Exported: nothing, since no confirmed motion keeps every limit and, to path.tolerance between its knots "
+            "too, its path (export.method names one anyway)."
         ]
 
 
@@ -88,7 +88,8 @@ def chosen(motions: Motions) -> Evaluation | None:
     """The motion to export; None if there is no confirmed one, or none is asked for.
 
     The best one keeps every limit and every clearance at its knots, and its path between them too: a method that knows
-    none may go cheaply through a wall. Of a method with several optima, and of all methods, it is the cheapest by the problem's own objective.
+    none may go cheaply through a wall. Of a method with several optima, and of all methods, it is the cheapest by the
+    problem's own objective.
     """
     asked = motions.config.export.method
     good = [e for e in motions.solved if asked in ("best", e.method)]
