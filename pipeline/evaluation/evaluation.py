@@ -231,7 +231,7 @@ def _judge_between(
             promise = (
                 "which promises its knots alone" if solution.knots_only else "within what it promises at its knots"
             )
-            message = f"{solution.method} is up to {error:.2g} {unit} off its path, {promise}"
+            message = f"up to {error:.2g} {unit} off its path, {promise}"
         if error > own.max() + allowed and not solution.knots_only:
             return Status.UNCONFIRMED, (
                 f"between its knots the motion is up to {error:.2g} {unit} off its path (at t = {moment:.3g} s), "

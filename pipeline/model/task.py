@@ -189,7 +189,7 @@ class PoseTask:
         """How far two targets (6,) are from each other, [m] and [rad]: the angle of R0' R1, or between the axes."""
         pair = np.array([first, second])
         rotation = Rotation.from_rotvec(pair[:1, 3:]).as_matrix()
-        return float(np.linalg.norm(second[:3] - first[:3])), float(np.linalg.norm(self._turn(rotation, pair[1:])[0]))
+        return float(np.linalg.norm(second[:3] - first[:3])), float(np.linalg.norm(self.turn(rotation, pair[1:])[0]))
 
     def in_world(self, target: Array, fallback: Array) -> Array:
         """The points (K, 3) of targets (K, 6)."""
