@@ -26,6 +26,19 @@ def record(file: Path, layout: Any, fill: Callable[[Any], None]) -> None:
 
 
 def _stream(file: Path, layout: Any, fill: Callable[[Any], None]) -> None:
-    with strict(), rr.RecordingStream("selfmotion") as recording:
-        recording.save(file, default_blueprint=layout)
-        fill(recording)
+    log, streams = layout._log_to_stream, []
+
+    def remember(stream: Any) -> None:
+        streams.append(stream)
+        log(stream)
+
+    # Rerun makes a stream of its own for the blueprint, which holds itself alive until it is disconnected.
+    layout._log_to_stream = remember
+    try:
+        with strict(), rr.RecordingStream("selfmotion") as recording:
+            recording.save(file, default_blueprint=layout)
+            fill(recording)
+    finally:
+        del layout._log_to_stream
+        for stream in streams:
+            stream.disconnect()
