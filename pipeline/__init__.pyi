@@ -25,10 +25,10 @@ from .model.task import PoseTask as PoseTask
 from .model.task import PositionTask as PositionTask
 from .path.curves import Arc as Arc
 from .path.curves import Line as Line
-from .path.curves import Spline as Spline
 from .path.curves import circle as circle
 from .path.curves import direction_vector as direction_vector
 from .path.reference import Reference as Reference
+from .path.spline import Spline as Spline
 from .path.timing import ConstantSpeed as ConstantSpeed
 from .path.timing import Quintic as Quintic
 from .path.timing import RaisedCosine as RaisedCosine

@@ -38,7 +38,7 @@ def calls(folder: Path) -> list[float]:
 
 def kept(store: Path) -> list[Path]:
     """What is finished there: a hidden file is one that was begun."""
-    return sorted(store.glob("[!.]*.pickle"))
+    return sorted(store.glob("[!.]*.result"))
 
 
 def in_pairs(context: Context, item: float) -> float:
@@ -119,3 +119,11 @@ def threads(folder: Path, item: int) -> tuple[int, int, float, float]:
     np.linalg.inv(np.eye(200))
     time.sleep(0.05)
     return max(pool["num_threads"] for pool in threadpool_info()), os.getpid(), begin, time.monotonic()
+
+
+def die_once(context: Context, item: float) -> float:
+    """Item 3 ends its process by SIGKILL, as the system does for want of memory; the second time only if it must."""
+    if item == 3 and ((context.folder / "always").exists() or not (context.folder / "died").exists()):
+        (context.folder / "died").touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return multiply(context, item)

@@ -63,6 +63,7 @@ def markdown(report: Report, table: pd.DataFrame, published: Printed) -> str:
     ]
     lines += [f"- **{e.label}**: {e.message or e.status.value}" for e in motions.evaluations]
     lines += [f"- robot file: {note}" for note in arm.notes]
+    lines += [f"- path: {note}" for note in reference.notes]
     for result in report.results:
         if section := result.section():
             lines += ["", *section]

@@ -32,13 +32,10 @@ def write_failure(folder: Path, reason: str, status: str = "bad input") -> None:
     write_beside(folder / "summary.csv", lambda file: row.to_csv(file, index=False))
 
 
-def write_crash(folder: Path, error: Exception) -> str:
-    """The same for an error that nobody foresaw, with its traceback in error.txt; returns the reason."""
+def write_traceback(folder: Path, error: BaseException) -> None:
+    """error.txt: where an error that nobody foresaw came from."""
     text = "".join(traceback.format_exception(error))
     write_beside(folder / "error.txt", lambda file: file.write_text(text, encoding="utf-8"))
-    reason = f"{type(error).__name__}: {' '.join(str(error).split())} (see error.txt)"
-    write_failure(folder, reason, "error")
-    return reason
 
 
 def exit_code(folder: Path) -> int:

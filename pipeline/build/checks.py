@@ -6,8 +6,8 @@ import numpy as np
 
 from pipeline.common.errors import ConfigError, PathError
 from pipeline.model.clearance import Clearance
-from pipeline.model.kinematics import project
-from pipeline.problem.problem import Boundary, Problem
+from pipeline.model.kinematics import ATTEMPTS, reach
+from pipeline.problem.problem import CLOSED, Boundary, Problem
 from pipeline.robot.limits import require_room
 
 
@@ -36,14 +36,11 @@ def check_problem(problem: Problem) -> None:
                     f"robot.q_init: {link} is {distance:.3g} m from obstacle {obstacle}, less than obstacles.margin = "
                     f"{problem.obstacles.margin:g} m, and boundary = fixed starts there"
                 )
-    if problem.boundary is Boundary.CYCLIC:
-        ends = problem.reference.position(np.array([0.0, problem.reference.duration]))
-        gap = float(np.linalg.norm(ends[1] - ends[0]))
-        if gap > 1e-9:
-            raise PathError(
-                f"boundary = cyclic: the path ends {gap:.3g} m{' and rad' * (len(ends[0]) > 3)} from where it starts; "
-                "a cycle needs a closed path"
-            )
+    if problem.boundary is Boundary.CYCLIC and not problem.closed_path:
+        gaps = [f"{gap:.3g} {unit}" for gap, unit in zip(problem.gap, ("m", "rad"), strict=True) if gap > CLOSED]
+        raise PathError(
+            f"boundary = cyclic: the path ends {' and '.join(gaps)} from where it starts; a cycle needs a closed path"
+        )
 
 
 def require_reach(problem: Problem) -> None:
@@ -53,20 +50,12 @@ def require_reach(problem: Problem) -> None:
     points = geometry.sample(s)[0]
     if problem.reference.orientation is not None:
         points = np.hstack([points, problem.reference.orientation.sample(s)[0]])
-    # From the nearest of several configurations: one start alone can get stuck although the point can be reached.
-    rng = np.random.default_rng(0)
-    guesses = np.concatenate([problem.q_init[None], rng.uniform(-np.pi, np.pi, (11, task.arm.n))])
-    gap = np.full(len(points), np.inf)
-    for guess in guesses:
-        open_points = gap > 1e-6
-        if not open_points.any():
-            return
-        _, left = project(task, np.tile(guess, (int(open_points.sum()), 1)), points[open_points])
-        gap[open_points] = np.minimum(gap[open_points], left)
+    _, gap = reach(task, problem.q_init, points)
     out = np.flatnonzero(gap > 1e-6)
     if out.size:
         worst = int(np.argmax(gap))
         raise PathError(
             f"path: out of reach from {s[out[0]]:.3g} m along its {geometry.length:.3g} m on; "
-            f"the arm misses it by up to {gap[worst]:.3g} m{' and rad' * (points.shape[1] > 3)} (at {s[worst]:.3g} m)"
+            f"the nearest of {ATTEMPTS} attempts misses it by up to {gap[worst]:.3g} "
+            f"m{' and rad' * (points.shape[1] > 3)} (at {s[worst]:.3g} m)"
         )

@@ -9,17 +9,21 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from pipeline.common.arrays import Array
-from pipeline.common.errors import ConfigError, RobotError
+from pipeline.common.errors import ConfigError, PathError, RobotError
 from pipeline.config.messages import shown
 from pipeline.config.path import CircleConfig, PathConfig, TimingConfig, WaypointsConfig
 from pipeline.config.robot import RobotConfig
 from pipeline.model.arm import Arm
 from pipeline.model.kinematics import place
 from pipeline.model.task import PositionTask, Task, pose_task
-from pipeline.path.curves import Geometry, Line, Spline, circle, direction_vector
+from pipeline.path.curves import Geometry, Line, Still, circle, direction_vector
 from pipeline.path.orientation import Orientation
-from pipeline.path.timing import ConstantSpeed, Quintic, RaisedCosine, Timing
-from pipeline.path.waypoints import read_orientations, read_waypoints
+from pipeline.path.reference import Reference
+from pipeline.path.through import SAME, TURN, Through, steps, through
+from pipeline.path.timing import ConstantSpeed, Quintic, RaisedCosine, Stamped, Timing, WithStops
+from pipeline.path.waypoints import Waypoints, read, same_point
+
+NEGLIGIBLE = 1e-9  # of the length: a departure from the polygon below it is rounding
 
 TIMINGS: dict[str, Callable[[float], Timing]] = {
     "raised_cosine": RaisedCosine,
@@ -28,16 +32,14 @@ TIMINGS: dict[str, Callable[[float], Timing]] = {
 }
 
 
-def make_knots(timing: TimingConfig) -> Array:
+def make_knots(timing: TimingConfig, duration: float) -> Array:
     """The grid (steps + 1,) [s]: even, or finer by the factors of `dense`."""
     if not timing.dense:
-        return np.linspace(0.0, timing.duration, timing.steps + 1)
+        return np.linspace(0.0, duration, timing.steps + 1)
     latest = max(end for _, end, _ in timing.dense)
-    if latest > timing.duration:
-        raise ConfigError(
-            f"timing.dense reaches to {latest:g} s, the motion ends at timing.duration = {timing.duration:g} s"
-        )
-    fine = np.linspace(0.0, timing.duration, 20 * timing.steps + 1)
+    if latest > duration:
+        raise ConfigError(f"timing.dense reaches to {latest:g} s, the motion ends at {duration:g} s")
+    fine = np.linspace(0.0, duration, 20 * timing.steps + 1)
     density = np.ones(len(fine) - 1)
     middle = (fine[1:] + fine[:-1]) / 2
     for start, end, factor in timing.dense:
@@ -56,28 +58,39 @@ def make_task(robot: RobotConfig, arm: Arm) -> Task:
     return pose_task(arm, robot.orientation, robot.pointing)
 
 
-def make_path(path: Any, task: Task, q_init: Array) -> tuple[Geometry, Orientation | None, Array]:
-    """The path's curve and orientations, and q_init moved onto its start if the path says where it starts."""
+def make_reference(path: Any, timing: TimingConfig, task: Task, q_init: Array) -> tuple[Reference, Array]:
+    """The end effector's motion, and q_init moved onto its start if the path says where it starts."""
     count = len(task.axes)
     here = task.value(q_init[None])[0]
-    geometry = _geometry(path, task, here[:count])
-    orientation = _orientation(path, task, geometry, here[count:])
-    s = np.zeros(1)
-    start = (
-        geometry.sample(s)[0] if orientation is None else np.hstack([geometry.sample(s)[0], orientation.sample(s)[0]])
-    )
+    given = path.orientation is not None or any(path.turn)
+    if given and isinstance(task, PositionTask):
+        raise ConfigError(
+            "path.orientation, path.turn: the task prescribes no orientation; set robot.orientation to full or pointing"
+        )
+    if isinstance(path, WaypointsConfig):
+        rows = _read(path, timing, task)
+        points = rows.points + here[:count] - rows.points[0] if path.relative else rows.points
+        found = through(points, rows.rotations, rest=path.corners == "rest")
+        geometry, orientation = found.geometry, found.orientation
+        law, notes = _law(path, timing, found, rows.times), _notes(path, found)
+    else:
+        if timing.law == "from_file":
+            raise ConfigError(
+                f"timing.law = from_file: the times are those of a file; path.kind = {path.kind} has none"
+            )
+        geometry, orientation, notes = _curve(path, task, here[:count]), None, ()
+        law = TIMINGS[timing.law](timing.duration)
+    if orientation is None and not isinstance(task, PositionTask):
+        orientation = _turning(path, geometry, here[count:])
+    start = np.hstack([one.sample(np.zeros(1))[0] for one in (geometry, orientation) if one is not None])
     if np.abs(task.error(q_init[None], start)).max() > 1e-12:
         q_init = place(task, q_init, start[0])
-    return geometry, orientation, q_init
+    return Reference(geometry, law, orientation, path.tolerance, path.orientation_tolerance, notes), q_init
 
 
-def _geometry(path: Any, task: Task, here: Array) -> Geometry:
+def _curve(path: Any, task: Task, here: Array) -> Geometry:
+    """A line or a circle, or the point on which the tool turns."""
     count = len(task.axes)
-    if isinstance(path, WaypointsConfig):
-        if path.file in ("", "???"):
-            raise ConfigError("path.file: not given; the way-points are rows of a CSV file, e.g. path.file=points.csv")
-        points = read_waypoints(path.file, task.axes)
-        return Spline(points + here - points[0] if path.relative else points)
     if path.start is not None and len(path.start) != count:
         raise ConfigError(f"path.start = {shown(path.start)}: must be {count} numbers m, one for each of robot.task")
     start = here if path.start is None else np.array(path.start)
@@ -90,27 +103,81 @@ def _geometry(path: Any, task: Task, here: Array) -> Geometry:
             normal=path.normal,
             angle=path.angle,
         )
+    if not path.length:
+        if not any(path.turn):
+            raise ConfigError("path.length = 0: the path has no length, in space or in orientation (path.turn)")
+        return Still(start, TURN * float(np.linalg.norm(path.turn)))
     return Line(start, direction_vector(path.direction, count), path.length)
 
 
-def _orientation(path: PathConfig, task: Task, geometry: Geometry, here: Array) -> Orientation | None:
-    """Way-points may bring their own; otherwise from `path.orientation` (or that of q_init) through `path.turn`."""
-    given = path.orientation is not None or any(path.turn)
-    if isinstance(task, PositionTask):
-        if given:
-            raise ConfigError(
-                "path.orientation, path.turn: the task prescribes no orientation; "
-                "set robot.orientation to full or pointing"
-            )
-        return None
-    if isinstance(path, WaypointsConfig) and isinstance(geometry, Spline):
-        own = read_orientations(path.file)
-        if own is not None and given:
-            raise ConfigError(f"path.orientation, path.turn: path.file = {path.file} has orientations of its own")
-        if own is not None:
-            return Orientation(geometry.marks, own)
+def _turning(path: PathConfig, geometry: Geometry, here: Array) -> Orientation:
+    """From `path.orientation` (or that of q_init) through `path.turn`, in proportion to the length."""
     first = Rotation.from_rotvec(here) if path.orientation is None else Rotation.from_euler("xyz", path.orientation)
     # Turns beyond half a turn need marks between: two rotations are joined by the shorter way.
     marks = np.linspace(0.0, 1.0, 2 + int(np.linalg.norm(path.turn) / 2))
     turned = Rotation.from_rotvec(marks[:, None] * np.array(path.turn))
     return Orientation(marks * geometry.length, turned * first)
+
+
+def _read(path: WaypointsConfig, timing: TimingConfig, task: Task) -> Waypoints:
+    """The rows of path.file, all of whose columns serve."""
+    if path.file in ("", "???"):
+        raise ConfigError("path.file: not given; the way-points are rows of a CSV file, e.g. path.file=points.csv")
+    rows, where = read(path.file, task.axes), f"path.file = {path.file}"
+    if rows.rotations is not None and isinstance(task, PositionTask):
+        raise ConfigError(
+            f"{where} has orientations, and the task prescribes none; set robot.orientation to full or pointing, or "
+            "take "
+            "the columns out"
+        )
+    if rows.rotations is not None and (path.orientation is not None or any(path.turn)):
+        raise ConfigError(f"path.orientation, path.turn: {where} has orientations of its own")
+    stamped = timing.law == "from_file"
+    if stamped and rows.times is None:
+        raise ConfigError(f"timing.law = from_file: {where} has no column time")
+    if not stamped and rows.times is not None:
+        raise ConfigError(
+            f"{where} has a column time, and timing.law = {timing.law} does not take it; set timing=from_file, or "
+            "take the "
+            "column out"
+        )
+    moves, turns = steps(rows.points, rows.rotations)
+    still = np.flatnonzero(np.maximum(moves, turns) <= SAME)
+    if still.size and (not stamped or len(still) == len(moves)):
+        raise PathError(f"{where}: {same_point(int(still[0]))}; to wait there takes a column time and timing=from_file")
+    return rows
+
+
+def _law(path: WaypointsConfig, timing: TimingConfig, found: Through, times: Array | None) -> Timing:
+    length = found.geometry.length
+    if times is not None:
+        return Stamped(tuple((times - times[0]).tolist()), tuple((found.marks / length).tolist()), found.stops)
+    law = TIMINGS[timing.law]
+    if not found.stops:
+        return law(timing.duration)
+    if not law(timing.duration).at_rest:
+        raise PathError(
+            f"path.file = {path.file}: the path turns back, or on the spot, at way-point {found.stops[0] + 1} while "
+            "moving at "
+            f"{length / timing.duration:.3g} m/s (timing.law = {timing.law}); the laws raised_cosine and quintic come "
+            "to "
+            "rest there"
+        )
+    between = [found.marks[i] / length for i in found.stops]
+    return WithStops(law, timing.duration, (0.0, *map(float, between), 1.0))
+
+
+def _notes(path: WaypointsConfig, found: Through) -> tuple[str, ...]:
+    notes = []
+    distance, before = found.departure
+    if distance > NEGLIGIBLE * found.geometry.length:
+        notes.append(
+            f"the smooth curve leaves the polygon of its way-points by up to {distance:.3g} m, between way-points "
+            f"{before} and "
+            f"{before + 1}; path.corners=rest goes straight, with a stop at each"
+        )
+    if found.stops:
+        shown_ones = ", ".join(str(i + 1) for i in found.stops[:8]) + ", ..." * (len(found.stops) > 8)
+        why = "" if path.corners == "rest" else ", where it turns back or on the spot"
+        notes.append(f"the path comes to rest at way-point{'s' * (len(found.stops) > 1)} {shown_ones}{why}")
+    return tuple(notes)

@@ -5,10 +5,9 @@ from __future__ import annotations
 from pipeline.build import base
 from pipeline.build.checks import check_problem, require_reach
 from pipeline.build.goal import make_limits, make_objective, make_obstacles
-from pipeline.build.path import TIMINGS, make_knots, make_path, make_task
+from pipeline.build.path import make_knots, make_reference, make_task
 from pipeline.build.robot import initial, load
 from pipeline.config.run import RunConfig
-from pipeline.path.reference import Reference
 from pipeline.problem.problem import Boundary, Problem
 from pipeline.robot.limits import require_held_within
 
@@ -21,13 +20,12 @@ def prepare(config: RunConfig) -> Problem:
         require_held_within(arm.description)
     task = make_task(robot, arm)
     q_init = initial(robot, arm)
-    geometry, orientation, q_init = make_path(config.path, task, q_init)
-    reference = Reference(geometry, TIMINGS[config.timing.law](config.timing.duration), orientation)
+    reference, q_init = make_reference(config.path, config.timing, task, q_init)
     problem = Problem(
         task,
         reference,
         q_init,
-        make_knots(config.timing),
+        make_knots(config.timing, reference.duration),
         objective=make_objective(config, arm),
         limits=make_limits(config.limits, arm),
         boundary=Boundary(config.boundary.kind),

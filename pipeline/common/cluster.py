@@ -1,6 +1,7 @@
 """Work on a running Dask cluster. Its workers need this project in the same versions, but not our files.
 
-A task carries everything it needs, so that the cluster can repeat it elsewhere when a worker is lost.
+A task carries everything it needs, so that the cluster can repeat it elsewhere when a worker is lost. It is a pickle:
+who reaches the scheduler may run code on its workers, as with every Dask cluster. Results come back as plain numbers.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import threading
 from collections.abc import Generator, Sequence
 from typing import Any
 
+from pipeline.common import kept
 from pipeline.common.errors import ConfigError
 from pipeline.common.versions import stamp
 
@@ -45,14 +47,22 @@ def check(address: str) -> None:
         print(f"{address} has no workers yet; waiting for the first", flush=True)
 
 
-def run(address: str, function: Any, context: Any, items: Sequence[Any]) -> Generator[tuple[int, bytes], None, None]:
-    """(index, pickled function(context, item)) for all items, in the order in which they finish."""
+def run(
+    address: str, wait: float, function: Any, context: Any, items: Sequence[Any]
+) -> Generator[tuple[int, bytes], None, None]:
+    """(index, function(context, item) as `kept` writes it) for all items, in the order in which they finish."""
     check(address)
     from distributed import Client, as_completed
     from distributed.client import FutureCancelledError
 
     logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # what goes wrong is raised below
     with Client(address, timeout=TIMEOUT, set_as_default=False) as client:
+        try:
+            client.wait_for_workers(1, timeout=wait)
+        except TimeoutError:
+            raise ConfigError(
+                f"parallel.address = {address}: no worker came within parallel.wait = {wait:g} s"
+            ) from None
         tasks = [pickle.dumps((function, context, item)) for item in items]
         futures = client.map(_task, tasks, versions=stamp(), pure=False)
         indices = {future.key: index for index, future in enumerate(futures)}
@@ -73,4 +83,4 @@ def _task(task: bytes, versions: str) -> bytes:
         raise ConfigError(f"parallel.address: a worker has other versions ({stamp()}) than this process ({versions})")
     with _solving, threadpool_limits(1):
         function, context, item = pickle.loads(task)
-        return pickle.dumps(function(context, item))
+        return kept.dumps(function(context, item))

@@ -21,3 +21,7 @@ class PathError(InputError):
 
 class OutputError(InputError):
     """The results cannot be written; the message names the folder."""
+
+
+class WorkerError(InputError):
+    """The machine ended the processes that do the work; the message says what needs less of it."""

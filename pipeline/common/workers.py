@@ -1,24 +1,29 @@
 """One map over workers, with progress and resume. It knows nothing of what it maps.
 
 Results come back in the order of the items, whatever the workers: processes here, or those of a running Dask cluster.
-With a `store`, every finished result is kept under a key made from the function, the shared context, the item and the
-versions in use, so that a killed run goes on where it was and never picks up work that belongs to other inputs.
+With a `store`, every finished result is kept under a key made from the function, the shared context, the item, our
+source and the versions in use: a killed run goes on where it was and never takes work that belongs to other inputs.
 """
 
 from __future__ import annotations
 
-import hashlib
 import multiprocessing
-import pickle
+import os
+import threading
+import time
 from collections.abc import Callable, Generator, Sequence
 from contextlib import closing
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
 import joblib
 from joblib import Parallel, delayed, parallel_config
+from joblib.externals.loky.process_executor import BrokenProcessPool
 
+from pipeline.common import kept
+from pipeline.common.errors import WorkerError
 from pipeline.common.files import write_beside
 from pipeline.common.versions import stamp
 
@@ -31,7 +36,7 @@ Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 
-_DIGEST = hashlib.sha256().digest_size
+LOOK_EVERY = 0.5  # [s], at its parent: a worker
 
 
 @dataclass(frozen=True)
@@ -44,6 +49,7 @@ class Workers:
     count: int | None = 1
     store: Path | None = None
     address: str | None = None
+    wait: float = 60.0  # [s] for the first worker of the cluster
 
     def check(self) -> None:
         """Raise ConfigError if there is no cluster where one should be."""
@@ -61,20 +67,20 @@ class Workers:
     ) -> list[Result]:
         """function(context, item) for all items; `done(finished, result)` after each, in order."""
         files = [self._file(function, context, item) for item in items]
-        kept = {index: result for index, file in enumerate(files) for result in _load(file)}
-        missing = [index for index in range(len(items)) if index not in kept]
+        known = {index: result for index, file in enumerate(files) for result in _load(file)}
+        missing = [index for index in range(len(items)) if index not in known]
         work = [(files[index], items[index]) for index in missing]
         results = []
         with closing(self._run(function, context, work)) as fresh:
             for index in range(len(items)):
-                result = kept[index] if index in kept else next(fresh)
+                result = known[index] if index in known else next(fresh)
                 results.append(result)
                 done(index + 1, result)
         return results
 
     def _run(self, function: Any, context: Any, work: list[tuple[Path | None, Any]]) -> Generator[Any, None, None]:
         if self.address is not None and work:
-            return _on_cluster(self.address, function, context, work)
+            return _on_cluster((self.address, self.wait), function, context, work)
         return _here(min(self._count(), len(work)), function, context, work)
 
     def _count(self) -> int:
@@ -86,7 +92,7 @@ class Workers:
             return None
         # joblib's hash, because equal objects need not have equal pickles.
         key = joblib.hash((stamp(), function.__module__, function.__qualname__, context, item), hash_name="sha1")
-        return self.store / f"{key}.pickle"
+        return self.store / f"{key}.result"
 
 
 def _here(count: int, function: Any, context: Any, work: list[tuple[Path | None, Any]]) -> Generator[Any, None, None]:
@@ -94,50 +100,81 @@ def _here(count: int, function: Any, context: Any, work: list[tuple[Path | None,
         for file, item in work:
             yield _one(function, context, item, file)
         return
-    jobs = (delayed(_one)(function, context, item, file) for file, item in work)
-    with parallel_config(backend="loky", inner_max_num_threads=1):
-        yield from Parallel(n_jobs=count, return_as="generator", batch_size=1)(jobs)
+    given, restarted = 0, False
+    while given < len(work):
+        jobs = (delayed(_in_a_worker)(os.getpid(), function, context, item, file) for file, item in work[given:])
+        try:
+            with parallel_config(backend="loky", inner_max_num_threads=1):
+                for result in Parallel(n_jobs=count, return_as="generator", batch_size=1)(jobs):
+                    yield result
+                    given += 1
+        except BrokenProcessPool:
+            if restarted:
+                raise WorkerError(
+                    f"parallel.workers = {count}: worker processes were killed twice, by the system for want of "
+                    "memory or from outside; fewer of them, or fewer knots and starts, need less"
+                ) from None
+            restarted = True
+
+
+def _in_a_worker(parent: int, function: Any, context: Any, item: Any, file: Path | None) -> Any:
+    _follow(parent)
+    found = _load(file)  # a pool that was started again has some results already
+    return found[0] if found else _one(function, context, item, file)
+
+
+@cache
+def _follow(parent: int) -> None:
+    """End this process soon after the one that gives it work, however that ended: nobody waits for what it does."""
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(LOOK_EVERY)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
 
 
 def _one(function: Any, context: Any, item: Any, file: Path | None) -> Any:
     result = function(context, item)
-    if file is not None:
-        _keep(file, pickle.dumps(result))
+    if file is not None and _is_final(result):
+        _keep(file, kept.dumps(result))
     return result
 
 
+def _is_final(result: Any) -> bool:
+    """Whether it would come out the same again; one that a clock has stopped says that it would not."""
+    return getattr(result, "final", True)
+
+
 def _on_cluster(
-    address: str, function: Any, context: Any, work: list[tuple[Path | None, Any]]
+    there: tuple[str, float], function: Any, context: Any, work: list[tuple[Path | None, Any]]
 ) -> Generator[Any, None, None]:
     """Results are kept here, as they finish: a cluster need not share our files."""
     from pipeline.common import cluster
 
-    waiting: dict[int, bytes] = {}
+    waiting: dict[int, Any] = {}
     following = 0
-    with closing(cluster.run(address, function, context, [item for _, item in work])) as finished:
+    with closing(cluster.run(*there, function, context, [item for _, item in work])) as finished:
         for index, content in finished:
-            file = work[index][0]
-            if file is not None:
+            file, result = work[index][0], kept.loads(content)
+            if file is not None and _is_final(result):
                 _keep(file, content)
-            waiting[index] = content
+            waiting[index] = result
             while following in waiting:
-                yield pickle.loads(waiting.pop(following))
+                yield waiting.pop(following)
                 following += 1
 
 
 def _keep(file: Path, content: bytes) -> None:
-    """A pickle and its digest behind it."""
-    whole = content + hashlib.sha256(content).digest()
-    write_beside(file, lambda unfinished: unfinished.write_bytes(whole))
+    write_beside(file, lambda unfinished: unfinished.write_bytes(content))
 
 
 def _load(file: Path | None) -> list[Any]:
-    """The result in `file`; none if it is not there, or not what was written."""
+    """The result in `file`; none if it is not there, or not what was written: all that is lost is time."""
     if file is None or not file.is_file():
         return []
     try:
-        whole = file.read_bytes()
-        content, digest = whole[:-_DIGEST], whole[-_DIGEST:]
-        return [pickle.loads(content)] if hashlib.sha256(content).digest() == digest else []
-    except Exception:  # anything can go wrong with a pickle, and all that is lost is time
+        return [kept.loads(file.read_bytes())]
+    except (OSError, ValueError):
         return []

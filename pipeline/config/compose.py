@@ -11,12 +11,14 @@ from omegaconf.errors import OmegaConfBaseException
 
 from pipeline.common.errors import ConfigError
 from pipeline.common.files import shipped
+from pipeline.config.as_written import keep_as_written
 from pipeline.config.methods import METHODS
 from pipeline.config.run import RunConfig, check
 
 
 def experiment(name: str, *overrides: str) -> RunConfig:
     """The checked configuration of `+experiment=name`; raises ConfigError, one line."""
+    keep_as_written()
     words = [f"+experiment={name}", *overrides]
     if GlobalHydra.instance().is_initialized():
         return checked(compose("config", overrides=words))

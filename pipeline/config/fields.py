@@ -11,6 +11,7 @@ A description begins with the unit in brackets, if there is one: messages, `--he
 
 from __future__ import annotations
 
+import re
 from dataclasses import field
 from functools import wraps
 from typing import Annotated, Any, TypeVar, cast, dataclass_transform
@@ -46,6 +47,13 @@ def _text(value: Any) -> Any:
     return value if isinstance(value, dict | list | tuple | None) else str(value)
 
 
+def as_name(text: str) -> str:
+    """A name that can be a folder's, and that stands in Markdown and HTML as it is; raises ValueError."""
+    if not re.fullmatch(r"\w([\w .,+()@=-]{0,98}[\w)])?", text):
+        raise ValueError("must be a name of at most 100 letters, digits and blanks or . , + - = @ ( ) _ within")
+    return text
+
+
 def _once(words: tuple[T, ...]) -> tuple[T, ...]:
     if len(set(words)) != len(words):
         raise ValueError("a word stands twice")
@@ -64,6 +72,7 @@ def _kind(value: Any) -> str:
 Number = Annotated[float, Strict(), AllowInfNan(False)]  # finite; neither true nor "1" is one
 Whole = Annotated[int, Strict(), BeforeValidator(_whole)]  # 4.0 is one
 Switch = Annotated[bool, Strict()]
+Name = Annotated[str, BeforeValidator(_text), AfterValidator(as_name)]
 Text = Annotated[str, BeforeValidator(_text)]
 Numbers = tuple[Number, ...]
 Vector = Annotated[Numbers, Field(min_length=3, max_length=3)]

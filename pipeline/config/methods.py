@@ -23,12 +23,21 @@ MethodName = Literal[
 ]
 METHODS: tuple[str, ...] = get_args(MethodName)
 
+# A count is bounded where memory or days of work would end a run instead of a line.
+MOST_KNOTS = 100_000  # of a prediction or grid: each has a mass matrix and its derivatives
+MOST_STARTS = 100_000  # each is a solve
+MOST_MOTIONS = 1_000_000  # each is followed along the coarsest grid
+
 Step = Annotated[Positive, Field(description="[s] integration step")]
 Gain = Annotated[
     Number, Field(ge=0, description="[1/s] closed-loop correction of the tracking error; 0: as in the paper")
 ]
 Tolerance = Annotated[Positive, Field(description="of the solver, relative to the objective of the start")]
-Iterations = Annotated[Whole, Field(ge=1, description="of the solver, at most")]
+Iterations = Annotated[Whole, Field(ge=1, le=1_000_000, description="of the solver, at most")]
+MaxTime = Annotated[
+    Positive | None,
+    Field(description="[s] of one solve, which is stopped then: results depend on the machine; null: no limit"),
+]
 Singular = Annotated[
     Positive, Field(description="smallest over largest singular value of J below which a motion counts as singular")
 ]
@@ -37,6 +46,7 @@ Prediction = Annotated[
     Field(description="of a prediction; problem: the problem's, kinetic energy in place of torques"),
 ]
 Drift = Annotated[Positive, Field(description="[m] tracking error above which the motion is not confirmed")]
+Apart = Annotated[Number, Field(gt=0, le=3.14)]  # [rad]: no two joint angles are farther apart, but for full turns
 
 
 @schema
@@ -56,7 +66,7 @@ class PmkeOptions:
 
     dt: Step = 0.01
     prediction_step: Annotated[Positive, Field(description="[s] spacing of the predicted knots (Delta T)")] = 1.0
-    horizon: Annotated[Whole, Field(ge=1, description="predicted knots (h)")] = 2
+    horizon: Annotated[Whole, Field(ge=1, le=1000, description="predicted knots (h)")] = 2
     update_interval: Annotated[Positive, Field(description="[s] between predictions (I)")] = 0.5
     objective: Prediction = "problem"
     interpolation: Annotated[
@@ -74,11 +84,12 @@ class RecedingOptions:
     """PMKE with limits: a receding horizon that keeps limits and obstacles; its knots are executed as they are."""
 
     prediction_step: Annotated[Positive, Field(description="[s] spacing of the knots")] = 1.0
-    horizon: Annotated[Whole, Field(ge=1, description="predicted knots")] = 2
+    horizon: Annotated[Whole, Field(ge=1, le=1000, description="predicted knots")] = 2
     update_interval: Annotated[Positive, Field(description="[s] between predictions")] = 0.5
     objective: Prediction = "problem"
     tail: Annotated[
-        Whole, Field(ge=0, description="coarse knots from the horizon to the end of the path, against dead ends")
+        Whole,
+        Field(ge=0, le=1000, description="coarse knots from the horizon to the end of the path, against dead ends"),
     ] = 8
     tolerance: Annotated[Positive, Field(description="of a prediction, relative to its objective")] = 1e-8
 
@@ -98,33 +109,37 @@ class GlobalOptions:
         Literal["newton", "ipopt"],
         Field(description="newton, confirmed by ipopt, where it serves the problem (the log says so); ipopt: alone"),
     ] = "newton"
-    nodes: Annotated[Whole, Field(ge=8, description="of the roadmap, in each layer")] = 300
-    layers: Annotated[Whole, Field(ge=2, description="of the roadmap, after the first")] = 6
+    nodes: Annotated[Whole, Field(ge=8, le=10_000, description="of the roadmap, in each layer")] = 300
+    layers: Annotated[Whole, Field(ge=2, le=1000, description="of the roadmap, after the first")] = 6
     configurations: Annotated[
-        Whole, Field(ge=1, description="initial ones by random self-motion (boundaries free and cyclic)")
+        Whole,
+        Field(ge=1, le=MOST_STARTS, description="initial ones by random self-motion (boundaries free and cyclic)"),
     ] = 66
     draw: Annotated[
         Literal["normal", "latin_hypercube", "uniform"],
         Field(description="of the self-motion; uniform reaches every component of the manifold"),
     ] = "normal"
     candidates: Annotated[
-        Annotated[Whole, Field(ge=1)] | None,
+        Annotated[Whole, Field(ge=1, le=MOST_MOTIONS)] | None,
         Field(
             description="weighted-pseudoinverse motions that are ranked; null: (points x joints)^2 of the coarsest grid"
         ),
     ] = None
-    optimised: Annotated[Whole, Field(ge=1, description="motions that are optimised on the coarsest grid")] = 64
+    optimised: Annotated[
+        Whole, Field(ge=1, le=MOST_STARTS, description="motions that are optimised on the coarsest grid")
+    ] = 64
     limit_weight: Annotated[
         Number, Field(ge=0, description="k_L of eq. (14): distance from the joint limits in the ranking")
     ] = 0.01
     coarse_steps: Annotated[
-        Annotated[Whole, Field(ge=2)] | None,
+        Annotated[Whole, Field(ge=2, le=MOST_KNOTS)] | None,
         Field(description="intervals of the coarsest grid, at most; null: 25, and 12 where ipopt works alone"),
     ] = None
     tolerance: Tolerance = 1e-8
     max_iterations: Iterations = 300
+    max_time: MaxTime = None
     same_path: Annotated[
-        Positive, Field(description="[rad] motions that differ by less at every knot are the same optimum")
+        Apart, Field(description="[rad] motions that differ by less at every knot, but for full turns, are one optimum")
     ] = 0.05
 
 
@@ -132,23 +147,28 @@ class GlobalOptions:
 class DynamicProgrammingOptions:
     """Dynamic programming on a grid of the self-motion manifold (r = 1): a certificate for the global optimum."""
 
-    nodes: Annotated[Whole, Field(ge=8, description="on the longest manifold along the path")] = 360
+    nodes: Annotated[Whole, Field(ge=8, le=10_000, description="on the longest manifold along the path")] = 360
     intervals: Annotated[
-        Annotated[Whole, Field(ge=2)] | None, Field(description="of the time grid; null: those of timing.steps")
+        Annotated[Whole, Field(ge=2, le=MOST_KNOTS)] | None,
+        Field(description="of the time grid; null: those of timing.steps"),
     ] = 25
     velocity_slack: Annotated[
         Number, Field(ge=0, description="node spacings by which a step may exceed a velocity limit")
     ] = 0.0
-    same_path: Annotated[Positive, Field(description="[rad] paths closer than this are the same optimum")] = 0.2
+    same_path: Annotated[
+        Apart, Field(description="[rad] paths closer than this, but for full turns, are one optimum")
+    ] = 0.2
 
 
 @schema
 class CalculusOfVariationsOptions:
     """Stationary motions of the kinetic-energy integral (r = 1, no limits)."""
 
-    spacing: Annotated[Positive, Field(description="[rad] of the scan along the initial self-motion manifold")] = 0.03
+    spacing: Annotated[
+        Number, Field(ge=1e-5, description="[rad] of the scan along the initial self-motion manifold")
+    ] = 0.03
     refinements: Annotated[
-        Whole, Field(ge=0, description="how often a scan interval is split where the final configuration jumps")
+        Whole, Field(ge=0, le=20, description="how often a scan interval is split where the final configuration jumps")
     ] = 3
     scan_tolerance: Annotated[Positive, Field(description="of the integration while scanning")] = 1e-6
     tolerance: Annotated[Positive, Field(description="of the integration of the motions found")] = 1e-10
@@ -162,14 +182,16 @@ class CalculusOfVariationsOptions:
 class PontryaginOptions:
     """The maximum principle as the two-point boundary-value problem that it is."""
 
-    guesses: Annotated[Whole, Field(ge=1, description="motions that the boundary-value problem is started from")] = 24
-    intervals: Annotated[Whole, Field(ge=4, description="of the mesh it starts on")] = 40
+    guesses: Annotated[
+        Whole, Field(ge=1, le=MOST_STARTS, description="motions that the boundary-value problem is started from")
+    ] = 24
+    intervals: Annotated[Whole, Field(ge=4, le=MOST_KNOTS, description="of the mesh it starts on")] = 40
     tolerance: Annotated[
         Positive, Field(description="of the collocation's relative residual and of the boundary conditions")
     ] = 1e-9
-    max_nodes: Annotated[Whole, Field(ge=10, description="of the mesh it ends on")] = 20000
+    max_nodes: Annotated[Whole, Field(ge=10, le=MOST_KNOTS, description="of the mesh it ends on")] = 20000
     same_path: Annotated[
-        Positive, Field(description="[rad] extremals that differ by less at every knot are the same")
+        Apart, Field(description="[rad] extremals that differ by less at every knot, but for full turns, are the same")
     ] = 0.01
 
 
@@ -189,10 +211,11 @@ class ParetoOptions:
         Literal["epsilon_constraint", "weighting"], Field(description="how the points between the extremes are found")
     ] = "epsilon_constraint"
     objectives: Annotated[Words[Integral], Field(description="the two integrals")] = ("kinetic_energy", "torque")
-    steps: Annotated[Whole, Field(ge=2, description="of each of the two directions")] = 10
-    rounds: Annotated[Whole, Field(ge=0, description="of starts from both neighbours, at most")] = 3
+    steps: Annotated[Whole, Field(ge=2, le=10_000, description="of each of the two directions")] = 10
+    rounds: Annotated[Whole, Field(ge=0, le=1000, description="of starts from both neighbours, at most")] = 3
     tolerance: Tolerance = 1e-8
     max_iterations: Iterations = 200
+    max_time: MaxTime = None
     planner: Annotated[GlobalOptions, Field(description="set method.global instead")] = GlobalOptions()
 
 

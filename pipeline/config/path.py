@@ -12,6 +12,10 @@ Direction = OneOrList[Number]
 START = "[m] task coordinates of the start; null: the end effector at robot.q_init"
 
 
+Turn = Annotated[Number, Field(ge=-1000, le=1000)]  # [rad]: a hundred and fifty times round
+Turns = Annotated[tuple[Turn, ...], Field(min_length=3, max_length=3)]
+
+
 def _finer(row: tuple[float, ...]) -> tuple[float, ...]:
     if len(row) != 3 or not 0 <= row[0] < row[1] or not row[2] > 0:
         raise ValueError("must be [from s, to s, factor] with 0 <= from < to and factor > 0")
@@ -25,11 +29,20 @@ class PathConfig:
     orientation: Annotated[
         Vector | None, Field(description="[rad] roll, pitch, yaw at the start, for such tasks; null: at robot.q_init")
     ] = None
-    turn: Annotated[Vector, Field(description="[rad] rotation vector by which it turns to the end, in the world")] = (
+    turn: Annotated[
+        Annotated[tuple[Turn, ...], Field(min_length=3, max_length=3)],
+        Field(description="[rad] rotation vector by which it turns to the end, in the world"),
+    ] = (
         0.0,
         0.0,
         0.0,
     )
+    tolerance: Annotated[Number, Field(gt=0, description="[m] how far from it a motion may be between its knots")] = (
+        1e-4
+    )
+    orientation_tolerance: Annotated[
+        Number, Field(gt=0, description="[rad] the same of the orientation, where one is prescribed")
+    ] = 1e-3
 
 
 @schema
@@ -37,7 +50,7 @@ class LineConfig(PathConfig):
     """`path=line`: straight, `length` m along `direction`."""
 
     kind: Literal["line"] = "line"
-    length: Annotated[Number, Field(gt=0, description="[m] length of the line")] = 0.4
+    length: Annotated[Number, Field(ge=0, description="[m] length of the line; 0: it turns on the spot")] = 0.4
     direction: Annotated[Direction, Field(description="[deg] angle in the task plane, or a vector")] = 157.5
     start: Annotated[Numbers | None, Field(description=START)] = None
 
@@ -52,7 +65,7 @@ class CircleConfig(PathConfig):
         Direction, Field(description="[deg] angle from the start to the centre in the task plane, or a vector")
     ] = 180.0
     clockwise: Annotated[Switch, Field(description="which way round, seen against `normal`")] = False
-    angle: Annotated[Number, Field(gt=0, description="[deg] how much of the circle")] = 360.0
+    angle: Annotated[Number, Field(gt=0, le=360_000, description="[deg] how much of the circle")] = 360.0
     normal: Annotated[Vector, Field(description="of the circle's plane, for tasks in space")] = (0.0, 0.0, 1.0)
     start: Annotated[Numbers | None, Field(description=START)] = None
 
@@ -62,8 +75,14 @@ class WaypointsConfig(PathConfig):
     """`path=waypoints`: a smooth curve through the rows of a CSV file."""
 
     kind: Literal["waypoints"] = "waypoints"
-    file: Annotated[Text, Field(description="CSV file with header x,y or x,y,z and values in m")] = ""
+    file: Annotated[
+        Text, Field(description="CSV file with header x,y or x,y,z, in m; orientations and times beside")
+    ] = ""
     relative: Annotated[Switch, Field(description="shift the curve so that it starts at the end effector")] = False
+    corners: Annotated[
+        Literal["smooth", "rest"],
+        Field(description="rest: straight from one way-point to the next, with a stop at each"),
+    ] = "smooth"
 
 
 @schema
@@ -71,9 +90,10 @@ class TimingConfig:
     """Group `timing`: the law s(t), the motion time and the number of intervals of the global grid."""
 
     law: Annotated[
-        Literal["raised_cosine", "constant_speed", "quintic"], Field(description="how the path is run through in time")
+        Literal["raised_cosine", "constant_speed", "quintic", "from_file"],
+        Field(description="how the path is run through in time; from_file: by the column time of path.file"),
     ] = "raised_cosine"
-    duration: Annotated[Number, Field(gt=0, description="[s] motion time")] = 10.0
+    duration: Annotated[Number, Field(gt=0, description="[s] motion time, unless it is from_file")] = 10.0
     steps: Annotated[Whole, Field(ge=2, le=100_000, description="intervals of the grid of the global optimum")] = 100
     dense: Annotated[
         tuple[Annotated[Numbers, AfterValidator(_finer)], ...],

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from pipeline.config.fields import Number, Numbers, OneOrList, Switch, Text, Vector, Words, schema
+from pipeline.config.fields import Name, Number, Numbers, OneOrList, Switch, Text, Vector, Words, schema
 
 Positive = Annotated[Number, Field(gt=0)]
 Edges = Annotated[tuple[Positive, ...], Field(min_length=3, max_length=3)]
@@ -50,7 +50,7 @@ Shape = Annotated[SphereConfig | BoxConfig | CapsuleConfig, Field(discriminator=
 class RobotConfig:
     """Group `robot`: the description, the end effector, what of it is prescribed, and where the arm starts."""
 
-    name: Annotated[Text, Field(description="of the robot, in tables and figures")] = "planar3r"
+    name: Annotated[Name, Field(description="of the robot, in tables and figures")] = "planar3r"
     urdf: Annotated[
         Text, Field(description="URDF, SDF or MJCF file: a path, one of robots/, or package://package/file")
     ] = "robots/planar3r.urdf"

@@ -10,11 +10,12 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from pipeline.config.fields import Switch, Text, Whole, WordOrVector, Words, build, schema
+from pipeline.config.fields import Name, Number, Switch, Text, Whole, WordOrVector, Words, build, schema
 from pipeline.config.goal import BoundaryConfig, KineticEnergyConfig, LimitsConfig, ObjectiveConfig
 from pipeline.config.methods import MethodConfig, MethodName
 from pipeline.config.path import CircleConfig, LineConfig, TimingConfig, WaypointsConfig
 from pipeline.config.robot import FixedBaseConfig, FreeBaseConfig, ObstaclesConfig, RobotConfig
+from pipeline.config.steps import refuse_endless
 from pipeline.config.studies import CandidateStudyConfig, ClosedLoopConfig, ExportConfig, IdentificationConfig
 
 
@@ -22,12 +23,15 @@ from pipeline.config.studies import CandidateStudyConfig, ClosedLoopConfig, Expo
 class ParallelConfig:
     """Group `parallel`: how independent solves are spread."""
 
-    workers: Annotated[Annotated[Whole, Field(ge=1)] | None, Field(description="local processes; null: all cores")] = (
-        None
-    )
+    workers: Annotated[
+        Annotated[Whole, Field(ge=1, le=1024)] | None, Field(description="local processes; null: all cores")
+    ] = None
     address: Annotated[
         Text | None, Field(description="of a running Dask scheduler, such as tcp://127.0.0.1:8786; null: none")
     ] = None
+    wait: Annotated[
+        Number, Field(ge=0, le=86_400, description="[s] for the first worker of a cluster that has none, at most")
+    ] = 60.0
 
 
 @schema
@@ -43,13 +47,13 @@ class SweepConfig:
 class RunConfig:
     """Everything that one run needs."""
 
-    name: Annotated[Text, Field(description="of the experiment: names the folder under outputs/")] = "run"
+    name: Annotated[Name, Field(description="of the experiment: names the folder under outputs/")] = "run"
     methods: Annotated[Words[MethodName], Field(description="which methods run, in this order")] = (
         "lsv",
         "pmke",
         "global",
     )
-    seed: Annotated[Whole, Field(ge=0, description="of every random draw")] = 1
+    seed: Annotated[Whole, Field(ge=0, le=2**64 - 1, description="of every random draw")] = 1
     robot: RobotConfig = RobotConfig()
     base: Annotated[FixedBaseConfig | FreeBaseConfig, Field(discriminator="kind")] = FixedBaseConfig()
     path: Annotated[LineConfig | CircleConfig | WaypointsConfig, Field(discriminator="kind")] = LineConfig()
@@ -72,4 +76,6 @@ class RunConfig:
 
 def check(values: Mapping[str, Any]) -> RunConfig:
     """The checked configuration of one run; raises ConfigError naming the key and what is allowed."""
-    return build(RunConfig, values)
+    config = build(RunConfig, values)
+    refuse_endless(config)
+    return config

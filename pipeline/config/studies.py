@@ -17,8 +17,8 @@ class CandidateStudyConfig:
     """The Global paper's Fig. 1: how near the best of so many candidates comes to the optimum."""
 
     run: Annotated[Switch, Field(description="whether it is made, see experiment candidate_study")] = False
-    most: Annotated[Whole, Field(ge=100, description="candidates")] = 10000
-    repeats: Annotated[Whole, Field(ge=1, description="populations that are averaged")] = 5
+    most: Annotated[Whole, Field(ge=100, le=1_000_000, description="candidates")] = 10000
+    repeats: Annotated[Whole, Field(ge=1, le=1000, description="populations that are averaged")] = 5
 
 
 @schema

@@ -24,12 +24,12 @@ BETWEEN = 10  # sub-intervals per knot interval on which the motion between knot
 
 def between_knots(
     problem: Problem, plant: SinglePlant, clearance: Clearance, trajectory: Trajectory, qd_start: Array
-) -> tuple[float, float, float, float, float, dict[str, float]]:
-    """The cubic spline through the knots: kinetic-energy integral (Simpson), objective, largest tracking and
-    orientation errors, smallest clearance, excess of limits.
+) -> tuple[float, float, float, dict[str, float]]:
+    """The cubic spline through the knots: kinetic-energy integral (Simpson), objective, smallest clearance, excess of
+    limits.
     """
     if not np.all(np.isfinite(trajectory.q)) or len(trajectory.time) < 4:
-        return float("nan"), float("nan"), float("nan"), float("nan"), float("nan"), {}
+        return float("nan"), float("nan"), float("nan"), {}
     # Only torques tie the first velocity to rest; the energy's sum lets it jump, and nothing prescribes the last one.
     torque_counts = problem.objective.second_order or bool(np.isfinite(problem.bounds.torque).any())
     rest = problem.reference.timing.at_rest and problem.boundary is not Boundary.CYCLIC and torque_counts
@@ -39,14 +39,13 @@ def between_knots(
     weights = np.array([1.0, *([4.0, 2.0] * (BETWEEN // 2))[:-1], 1.0]) / (3 * BETWEEN)
     dt = np.diff(trajectory.time)
     moments = (trajectory.time[:-1, None] + dt[:, None] * fraction).ravel()
-    q, qd, qdd, x_ref = spline(moments), spline(moments, 1), spline(moments, 2), problem.reference.position(moments)
-    energy, error, turned, secondary, turn = np.zeros((5, len(moments)))
+    q, qd, qdd = spline(moments), spline(moments, 1), spline(moments, 2)
+    energy, secondary, turn = np.zeros((3, len(moments)))
     tau, nb = np.zeros_like(q), plant.nb
     spinning = np.zeros(len(moments))
     for i in range(len(moments)):
         plant.at(q[i], qd[i])
         energy[i] = plant.kinetic_energy()
-        error[i], turned[i] = plant.task_error(problem.task, x_ref[i])
         turn[i] = angle_between(plant.start, plant.base()[1][None])[0]
         spinning[i] = plant.spin_squared()
         if problem.bounds.any:
@@ -59,7 +58,7 @@ def between_knots(
     objective = weighted_sum(problem, first_order, gain)
     clear = float(clearance(q[:: BETWEEN // CLEARANCES]).min())
     excess = limit_excess(problem, q, qd, tau, clear, float(turn.max()))
-    return integral, objective, float(error.max()), float(turned.max()), clear, excess
+    return integral, objective, clear, excess
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from pipeline.common.arrays import Array
 from pipeline.evaluation.base import BaseMotion, angle_between, base_motion, entered_cycle
 from pipeline.evaluation.between import between_knots
 from pipeline.evaluation.clearance import Clearance
+from pipeline.evaluation.curve import OffPath, off_path, steps_needed, turns_of_cycle
 from pipeline.evaluation.limits import LIMITS, limit_excess
 from pipeline.evaluation.plant import SinglePlant
 from pipeline.evaluation.sums import differences, running_integral, weighted_sum
@@ -52,8 +53,9 @@ class Evaluation:
     singular_value: Array  # (N + 1,) smallest of the task Jacobian
     spectral_radius: Array  # (N + 1,) of M
     energy_integral_spline: float  # of the cubic spline through the knots, independent of the grid's quadrature
-    tracking_error_between: float  # largest between knots, along that spline
+    tracking_error_between: float  # largest along the curve that is exported, between knots too
     orientation_error_between: float
+    on_path: bool  # whether both are within the tolerances of the path
     clearance: Array  # (N + 1,) [m] smallest distance of a moving link from an obstacle; infinite without obstacles
     clearance_between: float  # smallest along that spline
     limit_excess: dict[str, float]  # by kind, at the knots, relative; see limit_excess()
@@ -139,9 +141,10 @@ def evaluate(problem: Problem, solution: Solution) -> Evaluation:
     clearance = distances(q)
     turn = angle_between(plant.start, way)
     excess = limit_excess(problem, q, qd, tau, float(clearance.min()), float(turn.max()))
-    spline_integral, spline_objective, between, turned_between, clear_between, excess_between = between_knots(
+    spline_integral, spline_objective, clear_between, excess_between = between_knots(
         problem, plant, distances, trajectory, qd[0]
     )
+    off = off_path(problem, plant, time, q)
     secondary = np.array([plant.secondary(problem, qi) for qi in q]) if problem.objective.secondary else np.zeros(count)
     moving = q
     q, qd, qdd, tau = (values[:, arm.joints] for values in (q, qd, qdd, tau))
@@ -152,6 +155,8 @@ def evaluate(problem: Problem, solution: Solution) -> Evaluation:
     status, message = solution.status, solution.message
     if status is Status.SOLVED:
         status, message = _judge(moving, tracking, turned, excess, solution)
+    if status is Status.SOLVED:
+        status, message = _judge_between(problem, off, tracking, turned, solution)
     return Evaluation(
         solution=solution,
         status=status,
@@ -178,8 +183,11 @@ def evaluate(problem: Problem, solution: Solution) -> Evaluation:
         singular_value=singular,
         spectral_radius=radius,
         energy_integral_spline=spline_integral,
-        tracking_error_between=between,
-        orientation_error_between=turned_between,
+        tracking_error_between=off.distance,
+        orientation_error_between=off.angle,
+        on_path=bool(
+            off.distance <= problem.reference.tolerance and off.angle <= problem.reference.orientation_tolerance
+        ),
         clearance=clearance,
         clearance_between=clear_between,
         limit_excess=excess,
@@ -205,3 +213,45 @@ def _judge(
         if excess.get(kind, 0.0) > LIMITS:
             return Status.UNCONFIRMED, f"a {kind} limit is exceeded by {100 * excess[kind]:.2g} %"
     return Status.SOLVED, solution.message
+
+
+def _judge_between(
+    problem: Problem, off: OffPath, tracking: Array, turned: Array, solution: Solution
+) -> tuple[Status, str]:
+    """The curve that is exported: between the knots it may be off by the tolerances of the path more than at them,
+    where the method's own promise holds; and what there is to say of a cycle that winds.
+    """
+    message = solution.message
+    reference, time, arm = problem.reference, solution.trajectory.time, problem.task.arm
+    for error, own, allowed, unit, key, at in (
+        (off.distance, tracking, reference.tolerance, "m", "tolerance", off.at[0]),
+        (off.angle, turned, reference.orientation_tolerance, "rad", "orientation_tolerance", off.at[1]),
+    ):
+        if error > allowed and not message:
+            promise = (
+                "which promises its knots alone" if solution.knots_only else "within what it promises at its knots"
+            )
+            message = f"{solution.method} is up to {error:.2g} {unit} off its path, {promise}"
+        if error > own.max() + allowed and not solution.knots_only:
+            return Status.UNCONFIRMED, (
+                f"between its knots the motion is up to {error:.2g} {unit} off its path (at t = {at:.3g} s), more than "
+                f"path.{key} = {allowed:g} {unit}; {_advice(problem, time, error, allowed)}"
+            )
+    turns = (
+        turns_of_cycle(problem, solution.trajectory.q[:, arm.joints]) if problem.boundary is Boundary.CYCLIC else None
+    )
+    if turns is not None and np.any(turns):
+        names = arm.description.joints[arm.base.count :]
+        wound = [f"{name} {turn / (2 * np.pi):+.0f}" for name, turn in zip(names, turns, strict=True) if turn]
+        message = "; ".join(filter(None, [message, f"the cycle closes up to full turns: {', '.join(wound)}"]))
+    return Status.SOLVED, message
+
+
+def _advice(problem: Problem, time: Array, error: float, allowed: float) -> str:
+    """Which grid would do: that of the problem, or where a method has its own, its step."""
+    needed = steps_needed(problem, time, error, allowed)
+    if needed is None:
+        return "no finer grid helps: the motion does not follow the path between its knots"
+    if len(time) == len(problem.times):
+        return f"timing.steps = {needed} would do"
+    return f"a step of {problem.reference.duration / needed:.2g} s would do in place of {np.diff(time).max():.2g} s"

@@ -54,6 +54,7 @@ def solve(problem: Problem, options: DynamicProgrammingOptions, context: Context
             Status.SOLVED,
             optimum=rank + 1,
             tracking_tolerance=TRACKING,
+            knots_only=True,
             limits_kept=("position", "velocity", "clearance"),
             statistics={"cost": float(costs[index]), **(log if rank == 0 else {})},
         )

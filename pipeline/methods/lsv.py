@@ -8,10 +8,13 @@ On a floating base J is the generalized Jacobian and M the reduced inertia (`flo
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from pipeline.common.arrays import Array
 from pipeline.config.methods import LsvOptions
+from pipeline.methods.correction import diverges
 from pipeline.methods.method import ANY, Context, Method
 from pipeline.methods.singularity import SingularityWatch
 from pipeline.model.kinematics import least_velocity
@@ -29,8 +32,16 @@ def solve_weighted(problem: Problem, options: LsvOptions, context: Context) -> l
     return [_integrate("inertia_weighted", problem, options, weighted=True)]
 
 
-lsv = Method("lsv", "LSV", "#D9601A", LsvOptions, ANY, solve)
-inertia_weighted = Method("inertia_weighted", "Inertia-weighted", "#0E7490", LsvOptions, ANY, solve_weighted)
+lsv = Method("lsv", "LSV", "#D9601A", LsvOptions, ANY, solve, partial(diverges, "lsv"))
+inertia_weighted = Method(
+    "inertia_weighted",
+    "Inertia-weighted",
+    "#0E7490",
+    LsvOptions,
+    ANY,
+    solve_weighted,
+    partial(diverges, "inertia_weighted"),
+)
 
 
 def _integrate(method: str, problem: Problem, options: LsvOptions, *, weighted: bool) -> Solution:

@@ -6,8 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-import numpy as np
-
 from pipeline.common.errors import InputError
 from pipeline.common.workers import Workers
 from pipeline.problem.integrals import INTEGRALS
@@ -16,9 +14,6 @@ from pipeline.problem.problem import Boundary, Problem
 from pipeline.problem.solution import Progress, Solution, no_progress
 
 ALL_BOUNDARIES = frozenset(Boundary)
-
-
-CLOSED = 1e-9  # [m], and [rad] of an orientation: between the ends of a closed path
 
 
 @dataclass(frozen=True)
@@ -85,8 +80,7 @@ def _contradiction(problem: Problem) -> str | None:
     for name in problem.objective.weights:
         if INTEGRALS[name].base not in ("any", kind):
             return f"the objective holds {name}, which needs a {INTEGRALS[name].base} base; this one is {kind}"
-    start, end = problem.reference.position(np.array([0.0, problem.reference.duration]))
-    if problem.boundary is Boundary.CYCLIC and float(np.linalg.norm(end - start)) > CLOSED:
+    if problem.boundary is Boundary.CYCLIC and not problem.closed_path:
         return "the boundary is cyclic, but the path does not end where it starts"
     return None
 

@@ -26,6 +26,7 @@ from pipeline.problem.limits import LIMIT_KINDS
 from pipeline.problem.objective import Objective
 from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Solution, Status, Trajectory
+from pipeline.program.ipopt import STOPPED
 from pipeline.program.transcription import transcribe
 from pipeline.search.selection import path_distance
 
@@ -53,6 +54,11 @@ class Point:
     values: tuple[float, float] = (np.inf, np.inf)
     converged: bool = False
     status: str = "not solved"
+
+    @property
+    def final(self) -> bool:
+        """Whether it would come out the same again: no clock has stopped its solve."""
+        return self.status != STOPPED
 
     @property
     def cost(self) -> float:
@@ -167,7 +173,7 @@ def _solve_point(shared: tuple[Problem, ParetoOptions], item: tuple[Point, Array
     objective = _objective(options, point.weights)
     stated = replace(problem, objective=objective, bounds_of_integrals=bounds)
     q, outcome, _ = transcribe(stated, problem.times, guess).solve(
-        tolerance=options.tolerance, max_iterations=options.max_iterations
+        tolerance=options.tolerance, max_iterations=options.max_iterations, max_time=options.max_time
     )
     converged = outcome.converged and stays_on_path(problem, problem.times, q)
     return replace(point, q=q, values=_values(problem, options, q), converged=converged, status=outcome.status)

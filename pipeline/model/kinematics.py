@@ -10,6 +10,8 @@ from pipeline.common.errors import PathError
 from pipeline.model.arm import Arm
 from pipeline.model.task import Task
 
+ATTEMPTS = 12  # configurations that a target is sought from before it counts as out of reach
+
 
 def pseudoinverse(jacobian: Array) -> Array:
     """J+ (..., n, m) of J (..., m, n): the least-squares right inverse J'(J J')^-1, by singular values."""
@@ -79,12 +81,32 @@ def project(
     return q, error
 
 
+def reach(task: Task, q_init: Array, targets: Array, tolerance: float = 1e-6) -> tuple[Array, Array]:
+    """Configurations (K, n) as near to their targets (K, m) as they were found, and the distances left (K,) [m, rad].
+
+    Each is sought from q_init (n,), then from beside it, then from random ones until it arrives within `tolerance`,
+    from ATTEMPTS in all: one start alone can get stuck, as a stretched arm does.
+    """
+    rng = np.random.default_rng(0)
+    beside = q_init + rng.normal(scale=0.1, size=(ATTEMPTS // 3, len(q_init)))
+    anywhere = rng.uniform(-np.pi, np.pi, (ATTEMPTS - 1 - len(beside), len(q_init)))
+    q, left = np.tile(q_init, (len(targets), 1)), np.full(len(targets), np.inf)
+    for guess in (q_init, *beside, *anywhere):
+        rows = np.flatnonzero(left > tolerance)
+        if not rows.size:
+            break
+        landed, distance = project(task, np.tile(guess, (len(rows), 1)), targets[rows])
+        nearer = distance < left[rows]
+        q[rows[nearer]], left[rows[nearer]] = landed[nearer], distance[nearer]
+    return q, left
+
+
 def place(task: Task, q_init: Array, start: Array) -> Array:
-    """The configuration near q_init (n,) whose end effector is at the target `start`; PathError if there is none."""
-    q, error = project(task, q_init[None], start[None])
+    """A configuration, near q_init (n,) if it can be, whose end effector is at the target `start`; or PathError."""
+    q, error = reach(task, q_init, start[None], 1e-10)
     if error[0] > 1e-10:
         raise PathError(
             f"the path's start ({', '.join(f'{v:.4g}' for v in start[: len(task.axes)])}) m is out of reach: "
-            f"the arm comes within {error[0]:.3g} m of it from robot.q_init"
+            f"the nearest of {ATTEMPTS} attempts, from robot.q_init and elsewhere, ends {error[0]:.3g} m from it"
         )
     return q[0]

@@ -83,6 +83,10 @@ class PositionTask:
         """What J qdd + Jd qd (K, m) must be on the target."""
         return target_acceleration
 
+    def apart(self, first: Array, second: Array) -> tuple[float, float]:
+        """How far two targets (m,) are from each other, [m] and [rad]."""
+        return float(np.linalg.norm(second - first)), 0.0
+
     def in_world(self, target: Array, fallback: Array) -> Array:
         """Targets (K, m) as world points (K, 3); coordinates that are not prescribed come from `fallback` (3,)."""
         world = np.tile(fallback, (len(target), 1))
@@ -180,6 +184,14 @@ class PoseTask:
             spin = ((turning - target_rate[:, 3:]) * axis).sum(axis=1, keepdims=True)
             angular = angular + spin * np.cross(turning, axis)
         return np.hstack([target_acceleration[:, :3], self._own(rotation, angular)])
+
+    def apart(self, first: Array, second: Array) -> tuple[float, float]:
+        """How far two targets (6,) are from each other, [m] and [rad]: the angle of R0' R1, or that between the
+        axes.
+        """
+        pair = np.array([first, second])
+        rotation = Rotation.from_rotvec(pair[:1, 3:]).as_matrix()
+        return float(np.linalg.norm(second[:3] - first[:3])), float(np.linalg.norm(self.turn(rotation, pair[1:])[0]))
 
     def in_world(self, target: Array, fallback: Array) -> Array:
         """The points (K, 3) of targets (K, 6)."""

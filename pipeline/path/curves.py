@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from pipeline.common.arrays import Array
 from pipeline.common.errors import PathError
@@ -112,40 +111,13 @@ def circle(
     return Arc(start, inward, -heading if clockwise else heading, radius, float(np.deg2rad(angle)))
 
 
-class Spline:
-    """A cubic spline (C2) through `points` (P, m) [m], reparametrised by arc length."""
+@dataclass(frozen=True)
+class Still:
+    """A point (m,) that stays while the orientation turns; `length` [m] is what that turn counts (see TURN)."""
 
-    def __init__(self, points: Array) -> None:
-        chord = np.linalg.norm(np.diff(points, axis=0), axis=1)
-        knots = np.concatenate([[0.0], np.cumsum(chord)])
-        self._curve = CubicSpline(knots, points) if len(points) > 2 else CubicSpline(knots, points, bc_type="natural")
-        # Arc length by 8-point Gauss-Legendre on short pieces, then its inverse by Newton from a linear guess.
-        nodes, weights = np.polynomial.legendre.leggauss(8)
-        self._u = np.linspace(0.0, knots[-1], 64 * len(points))
-        half = np.diff(self._u)[:, None] / 2
-        inner = self._u[:-1, None] + half * (1 + nodes)
-        pieces = (half * weights * np.linalg.norm(self._curve(inner, 1), axis=2)).sum(axis=1)
-        self._s = np.concatenate([[0.0], np.cumsum(pieces)])
-        self._gauss = nodes, weights
-        self.length = float(self._s[-1])
-        self.marks = np.interp(knots, self._u, self._s)  # (P,) [m] where along the curve the points lie
-
-    def _parameter(self, s: Array) -> Array:
-        s = np.clip(s, 0.0, self.length)
-        u = np.interp(s, self._s, self._u)
-        left = np.clip(np.searchsorted(self._s, s, side="right") - 1, 0, len(self._u) - 2)
-        nodes, weights = self._gauss
-        for _ in range(4):
-            half = ((u - self._u[left]) / 2)[:, None]
-            speed = np.linalg.norm(self._curve(self._u[left][:, None] + half * (1 + nodes), 1), axis=2)
-            error = self._s[left] + (half * weights * speed).sum(axis=1) - s
-            u = u - error / np.linalg.norm(self._curve(u, 1), axis=1)
-        return np.clip(u, self._u[0], self._u[-1])
+    point: Array
+    length: float
 
     def sample(self, s: Array) -> tuple[Array, Array, Array]:
-        u = self._parameter(s)
-        first, second = self._curve(u, 1), self._curve(u, 2)
-        speed = np.linalg.norm(first, axis=1, keepdims=True)
-        tangent = first / speed
-        curvature = (second - tangent * np.einsum("km,km->k", tangent, second)[:, None]) / speed**2
-        return self._curve(u), tangent, curvature
+        nothing = np.zeros((len(s), len(self.point)))
+        return nothing + self.point, nothing, nothing

@@ -8,17 +8,24 @@ import numpy as np
 
 from pipeline.common.arrays import Array
 from pipeline.path.curves import Geometry
-from pipeline.path.orientation import Orientation
+from pipeline.path.spline import Sampled
 from pipeline.path.timing import Timing
 
 
 @dataclass(frozen=True)
 class Reference:
-    """The end-effector motion to follow: a geometry, with or without orientations, run through under a timing law."""
+    """The end-effector motion to follow: a geometry, with or without orientations, run through under a timing law.
+
+    tolerance [m], orientation_tolerance [rad]: how far from it a motion may be between its knots.
+    notes: what a user should know of the path, in sentences without a full stop.
+    """
 
     geometry: Geometry
     timing: Timing
-    orientation: Orientation | None = None
+    orientation: Sampled | None = None
+    tolerance: float = 1e-4
+    orientation_tolerance: float = 1e-3
+    notes: tuple[str, ...] = ()
 
     @property
     def duration(self) -> float:

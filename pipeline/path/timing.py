@@ -1,11 +1,14 @@
-"""Timing laws s(t): raised cosine, constant speed, quintic."""
+"""Timing laws s(t): raised cosine, constant speed, quintic; such a law with stops on the way; and time stamps."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
+from scipy.interpolate import BPoly
 
 from pipeline.common.arrays import Array
 
@@ -71,3 +74,61 @@ class Quintic:
         s = length * u**3 * (10 - 15 * u + 6 * u**2)
         sd = length / total * 30 * u**2 * (1 - u) ** 2
         return s, sd, length / total**2 * 60 * u * (1 - u) * (1 - 2 * u)
+
+
+@dataclass(frozen=True)
+class WithStops:
+    """A law from rest to rest between each stop and the next: the time is shared out by length, so that the same speed
+    is reached in all parts. stops: fractions of the length, increasing, from 0 to 1.
+    """
+
+    law: Callable[[float], Timing]
+    duration: float
+    stops: tuple[float, ...]
+    at_rest: bool = True
+
+    def sample(self, t: Array, length: float) -> tuple[Array, Array, Array]:
+        stops = np.array(self.stops)
+        which = np.searchsorted(stops[1:-1] * self.duration, t, side="right")
+        out: Array = np.empty((3, len(t)))
+        for i, share in enumerate(np.diff(stops)):
+            rows = which == i
+            part = self.law(share * self.duration).sample(t[rows] - stops[i] * self.duration, share * length)
+            out[:, rows] = part
+            out[0, rows] += stops[i] * length
+        return out[0], out[1], out[2]
+
+
+@dataclass(frozen=True)
+class Stamped:
+    """The fractions (P,) of the length at the times (P,) [s], from 0 on: rest to rest, and at rest in `stops`
+    (indices).
+
+    Quintics with continuous acceleration, which is zero at the time stamps. The speed there is the harmonic mean of the
+    mean speeds before and after (Fritsch and Butland 1984), at most 5/4 of either: then the differences of Bezier
+    points, 5 d0, 5 d0, 25 v - 10 (d0 + d1), 5 d1, 5 d1 with mean speed v, are not negative, and no quintic runs
+    backwards.
+    """
+
+    times: tuple[float, ...]
+    fractions: tuple[float, ...]
+    stops: tuple[int, ...] = ()
+    at_rest: bool = True
+
+    @property
+    def duration(self) -> float:
+        return self.times[-1]
+
+    @cached_property
+    def _law(self) -> BPoly:
+        s = np.array(self.fractions)
+        mean = np.diff(s) / np.diff(self.times)
+        before, after = mean[:-1], mean[1:]
+        harmonic = 2 * before * after / np.maximum(before + after, 1e-300)
+        speed = np.zeros(len(s))
+        speed[1:-1] = np.minimum(harmonic, 1.25 * np.minimum(before, after))
+        speed[list(self.stops)] = 0.0
+        return BPoly.from_derivatives(self.times, np.column_stack([s, speed, np.zeros(len(s))]))
+
+    def sample(self, t: Array, length: float) -> tuple[Array, Array, Array]:
+        return length * self._law(t), length * self._law(t, 1), length * self._law(t, 2)

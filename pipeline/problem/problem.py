@@ -6,6 +6,8 @@ import enum
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from pipeline.common.arrays import Array
 from pipeline.common.errors import InputError
 from pipeline.model.obstacles import Obstacles
@@ -14,6 +16,8 @@ from pipeline.path.reference import Reference
 from pipeline.problem.integrals import ByIntegral
 from pipeline.problem.limits import Limits
 from pipeline.problem.objective import Objective
+
+CLOSED = 1e-9  # [m] and [rad]: between the ends of a closed path
 
 
 class Boundary(enum.Enum):
@@ -55,6 +59,17 @@ class Problem:
     @property
     def bounds(self) -> Limits:
         return self.limits if self.limits is not None else Limits.none(self.task.arm.n)
+
+    @property
+    def gap(self) -> tuple[float, float]:
+        """How far the path's end is from its start, [m] and [rad]."""
+        start, end = self.reference.position(np.array([0.0, self.reference.duration]))
+        return self.task.apart(start, end)
+
+    @property
+    def closed_path(self) -> bool:
+        """Whether the path ends where it starts, so that a cycle can follow it."""
+        return max(self.gap) <= CLOSED
 
     @property
     def constrained(self) -> bool:

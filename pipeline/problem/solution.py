@@ -44,6 +44,7 @@ class Solution:
     `optimum` counts distinct optima of one method from 1 on. `event_time` [s] is when a singularity was met.
     `tracking_tolerance` [m] is what the method promises to keep of the path at its knots; the evaluation checks it.
     `limits_kept` are the kinds of limits that it promises to keep at its knots.
+    `knots_only`: it goes from node to node of a grid, and promises nothing of the path between its knots.
     `found` is False where there is no motion to speak of: the trajectory then only holds the arm at its start.
     """
 
@@ -56,6 +57,7 @@ class Solution:
     tracking_tolerance: float = np.inf
     limits_kept: tuple[str, ...] = ()
     found: bool = True
+    knots_only: bool = False
     statistics: dict[str, Any] = field(default_factory=dict)
 
     def to_frame(self) -> pd.DataFrame:

@@ -1,4 +1,4 @@
-"""Why a problem has no feasible motion: the limit that cannot be met, and the least violation found."""
+"""Why no feasible motion was found: the limit that no attempt keeps, and the least violation found."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ class Violation:
     relative: float
 
     @property
-    def sentence(self) -> str:
-        unit = UNITS[self.kind]
+    def bound(self) -> str:
+        return f"the {self.kind} limit of {self.joint} ({self.limit:.4g} {UNITS[self.kind]})"
+
+    @property
+    def extent(self) -> str:
         percent = f"{100 * self.relative:.0f}" if self.relative > 0.1 else f"{100 * self.relative:.2g}"
-        return (
-            f"no feasible motion: the {self.kind} limit of {self.joint} ({self.limit:.4g} {unit}) cannot be met; the "
-            f"least violation found is {percent} % ({self.reached:.4g} {unit} at t = {self.time:.3g} s)"
-        )
+        return f"{percent} % ({self.reached:.4g} {UNITS[self.kind]} at t = {self.time:.3g} s)"
 
 
 def violations(problem: Problem, times: Array, q: Array) -> list[Violation]:
@@ -93,18 +93,31 @@ def _worst(
 
 @dataclass(frozen=True)
 class Relaxed:
-    """A motion q (N + 1, n) on the path that exceeds its limits as little as could be found, and the worst of them."""
+    """A motion q (N + 1, n) on the path that exceeds its limits as little as could be found, and the worst of them.
+
+    starts: from how many motions it was sought. Local optima all: a sentence on them is no proof that no motion exists.
+    """
 
     q: Array
     worst: Violation
+    starts: int
 
     @property
     def feasible(self) -> bool:
         return self.worst.relative <= 1e-6
 
+    @property
+    def sentence(self) -> str:
+        tried = "the one attempt" if self.starts == 1 else f"none of {self.starts} attempts"
+        keeps = "does not keep" if self.starts == 1 else "keeps"
+        return (
+            f"{tried} to exceed the limits as little as possible {keeps} {self.worst.bound}; "
+            f"the least violation found is {self.worst.extent}"
+        )
+
 
 def least_violation(problem: Problem, times: Array, guesses: list[Array]) -> Relaxed | None:
-    """The limit to blame: the kind that, given way alone, lets a motion exist with the least excess.
+    """The limit to blame: the kind that, given way alone, lets a motion be found with the least excess.
 
     If no kind suffices alone, all give way together. None if no solve succeeds. A motion without any excess is
     feasible: the way to it led through motions that are not, which other solves do not dare.
@@ -136,5 +149,5 @@ def _relaxed(problem: Problem, times: Array, guesses: list[Array], kinds: list[s
             key=lambda violation: violation.relative,
         )
         if best is None or worst.relative < best.worst.relative:
-            best = Relaxed(q, worst)
+            best = Relaxed(q, worst, len(guesses))
     return best

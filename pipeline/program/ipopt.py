@@ -15,6 +15,7 @@ from pipeline.common.arrays import Array
 logging.getLogger("drake").setLevel(logging.ERROR)
 
 
+STOPPED = "stopped at max_time"  # by the clock: another machine, or another day, would have come farther
 CONVERGED = ("success", "stop at acceptable point")
 
 
@@ -34,10 +35,10 @@ def solve(
     *,
     tolerance: float = 1e-8,
     max_iterations: int = 200,
-    max_time: float = 60.0,
+    max_time: float | None = None,
     extra: dict[str, Any] | None = None,
 ) -> Outcome:
-    """Run IPOPT from `guess`; never raises for a solver failure.
+    """Run IPOPT from `guess`; never raises for a solver failure. No clock decides unless max_time [s] is given.
 
     The SPRAL settings halve the time of a whole solve on these banded problems (the defaults order and scale for much
     larger ones); bounds are not relaxed, so that a reported motion meets its limits to the digit.
@@ -47,7 +48,6 @@ def solve(
     settings: dict[str, Any] = {
         "tol": tolerance,
         "max_iter": max_iterations,
-        "max_wall_time": max_time,
         "limited_memory_max_history": 8,
         "bound_relax_factor": 0.0,
         # A hopeless start turns to feasibility early, and is given up early.
@@ -59,6 +59,7 @@ def solve(
         "spral_order": "metis",
         "spral_scaling": "none",
         "spral_nemin": 8,
+        **({} if max_time is None else {"max_wall_time": max_time}),
         **(extra or {}),
     }
     for key, value in settings.items():
@@ -69,4 +70,5 @@ def solve(
     details = result.get_solver_details()
     x = result.GetSolution(program.decision_variables())
     status = details.ConvertStatusToString().lower()
+    status = STOPPED if "time exceeded" in status else status
     return Outcome(x, status in CONVERGED, status, wall_time)

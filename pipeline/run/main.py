@@ -6,54 +6,64 @@
 from __future__ import annotations
 
 import os
-import re
 import sys
-import traceback
 from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 
 import hydra
 from hydra.core.hydra_config import HydraConfig
-from hydra.errors import HydraException
 from hydra.types import RunMode
 from omegaconf import DictConfig
-from omegaconf.errors import OmegaConfBaseException
 
-from pipeline.common.errors import InputError, OutputError
+from pipeline.common.errors import OutputError
 from pipeline.common.files import shipped
-from pipeline.run import completion, session
-from pipeline.run.refusals import in_one_line, refuse
+from pipeline.config.as_written import keep_as_written
+from pipeline.run import completion, ownership, session
+from pipeline.run.failures import foreseen, leaves, told, where
+from pipeline.run.refusals import refuse
+from pipeline.run.termination import terminable
 
 CONF = str(shipped("conf"))
 
 
 def job(values: DictConfig) -> int:
-    """One run, alone or within a sweep. A run of a sweep never raises, so that the others go on."""
+    """One run, alone or within a sweep. An error is a line, and a row in the sweep's table; the other runs go on."""
     from pipeline.artifacts import sweep
     from pipeline.config.compose import checked
     from pipeline.run import resume
     from pipeline.run.run import run
+    from pipeline.run.unused import unused
 
     hydra_values = HydraConfig.get()
     folder, sweeping = Path(hydra_values.runtime.output_dir), hydra_values.mode is RunMode.MULTIRUN
+    try:
+        ownership.own(folder)
+    except OutputError as error:  # nothing is written into what is another's
+        print(f"error: {error}", file=sys.stderr)
+        session.exit_code = 2
+        return 2
     try:
         config = checked(values)
         done = resume.finished(folder, config) if sweeping and config.sweep.resume else None
         if done is not None:
             print(f"{folder.name}: finished before, skipped (sweep.resume)", flush=True)
             return done
-        if sweeping:
-            resume.forget(folder)
+        resume.forget(folder)
+        for line in unused(hydra_values.overrides.task, config):
+            print(f"warning: {line}", file=sys.stderr)
         code = run(config, folder)
-    except InputError as error:
-        print(f"error: {error}", file=sys.stderr)
-        sweep.write_failure(folder, str(error))
-        code = 2
-    except Exception as error:
-        if not sweeping:
+    except BaseException as error:
+        if leaves(error):
             raise
-        print(f"error: {folder.name}: {sweep.write_crash(folder, error)}", file=sys.stderr)
-        code = 1
+        line, code = told(error)
+        if not foreseen(error):
+            sweep.write_traceback(folder, error)
+            line += " (see error.txt)"
+        print(f"error: {f'{folder.name}: ' if sweeping and code != 2 else ''}{line}", file=sys.stderr)
+        if sweeping or code == 2:
+            sweep.write_failure(folder, line, "bad input" if code == 2 else "error")
+    finally:
+        ownership.release(folder)
     session.exit_code = max(session.exit_code, code)
     return code
 
@@ -84,21 +94,17 @@ def run_job(
     # Hydra then hands its errors to us instead of printing pages and leaving with 1.
     os.environ["HYDRA_FULL_ERROR"] = "1"
     try:
-        refuse(asked)
-        hydra.main(version_base="1.3", config_path=CONF, config_name="config")(job)()
-    except InputError as error:
-        return _complain(str(error))
-    except (HydraException, OmegaConfBaseException) as error:
-        return _complain(in_one_line(error))
-    except OSError as error:
-        return _complain(str(OutputError(f"cannot write {error.filename!s}: {error.strerror}")))
-    except ValueError as error:
-        # Hydra lets some malformed overrides through to a bare ValueError; any other one is a bug of ours.
-        if not re.search(r"[/\\](omegaconf|hydra)[/\\]", traceback.extract_tb(error.__traceback__)[-1].filename):
-            raise
-        return _complain(f"{' '.join(sys.argv[1:])}: {in_one_line(error)}")
-    except KeyboardInterrupt:
-        return _complain("interrupted", 130)
+        with terminable():
+            refuse(asked)
+            keep_as_written()
+            hydra.main(version_base="1.3", config_path=CONF, config_name="config")(job)()
+    except BaseException as error:
+        if isinstance(error, SystemExit) and not isinstance(error.code, str):
+            raise  # somebody has said why
+        line, code = told(error)
+        return _complain(line if foreseen(error) else f"{line} ({where(error)})", code)
+    finally:
+        ownership.release()
     return session.exit_code
 
 
@@ -112,6 +118,6 @@ def _help(command: str, asks_for: Collection[str]) -> int:
     return 0
 
 
-def _complain(message: str, code: int = 2) -> int:
+def _complain(message: str, code: int) -> int:
     print(f"error: {message}", file=sys.stderr)
     return code

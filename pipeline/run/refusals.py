@@ -5,10 +5,12 @@ from __future__ import annotations
 import re
 import sys
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NoReturn
 
 from hydra import compose, initialize_config_dir
+from hydra._internal.utils import get_args_parser
 from hydra.core.global_hydra import GlobalHydra
+from hydra.core.override_parser.overrides_parser import OverridesParser
 from hydra.errors import HydraException, MissingConfigException, OverrideParseException
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
@@ -24,13 +26,22 @@ GROUP = r"\+?[a-z_/]+=[\w,]+"  # a word that may pick an option
 
 def refuse(words: Sequence[str]) -> None:
     """Raise ConfigError for what Hydra takes silently: a deleted option, or one only there to be inherited from."""
+    parser = get_args_parser()
+    parser.error = _unreadable  # type: ignore[method-assign]
+    parser.parse_args(words)
     for word in words:
+        if "\0" in word or word != word.encode(errors="replace").decode():
+            raise ConfigError(f"{word!a}: not UTF-8 text")
         if word.startswith("~") and _deletes_an_option(word):
             raise ConfigError(f"{word}: options cannot be deleted, only entries of tables; give it another value")
         group, _, option = word.lstrip("+").partition("=")
         hidden = [name for name in option.split(",") if name.startswith(HIDDEN)]
         if hidden and options(group):
             raise ConfigError(unknown_option(group, hidden[0], sorted(options(group))))
+
+
+def _unreadable(message: str) -> NoReturn:
+    raise ConfigError(f"{message}; see --help")
 
 
 def _deletes_an_option(word: str) -> bool:
@@ -59,12 +70,25 @@ def in_one_line(error: Exception) -> str:
         return unknown_option(group or "config", option, allowed)
     message = str(error.__cause__ or error)
     if isinstance(error, OverrideParseException):
-        message = f"in {' '.join(sys.argv[1:])}: {error}"
+        message = _quoted(error.override) or f"in {' '.join(sys.argv[1:])}: {error}"
     unknown = re.search(UNKNOWN, str(error))
     if unknown:
         key = unknown.group(1)
         return _without_its_plus(key) or unknown_key(key, _keys_beside(key))
     return " ".join(line.strip() for line in message.splitlines() if line.strip() and not line.startswith("See http"))
+
+
+def _quoted(word: str | None) -> str:
+    """The line for a value that Hydra reads in quotes only, as a path with an umlaut; empty if they do not help."""
+    key, sign, value = (word or "").partition("=")
+    inner = value.replace("\\", "\\\\").replace('"', '\\"')
+    better = f'{key}="{inner}"'
+    try:
+        OverridesParser.create().parse_override(better if sign else "")
+    except HydraException:
+        return ""
+    shell = better.replace("'", "'\\''")
+    return f"{word}: such a value is written in quotes: '{shell}'"
 
 
 def _without_its_plus(key: str) -> str:

@@ -8,6 +8,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from pipeline.common.errors import OutputError
 from pipeline.common.versions import DECISIVE, versions
 from pipeline.config.documents import FOLDER
 from pipeline.config.path import WaypointsConfig
@@ -30,12 +31,28 @@ def inputs(config: RunConfig) -> dict[str, str]:
 def finished(folder: Path, config: RunConfig) -> int | None:
     """The exit code of the run in `folder` if it is finished and would be the same now, else None."""
     try:
-        record = json.loads((folder / "run.json").read_text(encoding="utf-8"))
+        record = _record(folder)
         now = {**versions(), "config": asdict(config), "inputs": inputs(config)}
-        same = all(_plain(record[key]) == _plain(now[key]) for key in (*DECISIVE, "config", "inputs"))
+        same = all(_plain(record[key]) == _plain(now[key]) for key in ("source", *DECISIVE, "config", "inputs"))
         return int(record["exit_code"]) if same else None
     except (OSError, ValueError, KeyError):
         return None
+
+
+def refuse_another(folder: Path, config: RunConfig) -> None:
+    """Raise OutputError if `folder` holds the finished run of another configuration, which would be lost."""
+    try:
+        held = _record(folder)["config"]
+    except (OSError, ValueError, KeyError):
+        return
+    if _plain(held) != _plain(asdict(config)):
+        raise OutputError(
+            f"{folder}: holds the finished run of another configuration; choose another folder or delete this one"
+        )
+
+
+def _record(folder: Path) -> Any:
+    return json.loads((folder / "run.json").read_text(encoding="utf-8"))
 
 
 def forget(folder: Path) -> None:

@@ -30,7 +30,7 @@ def run(config: RunConfig, folder: Path) -> int:
     stages, console = Stages(), Console()
     with stages("prepare"):
         problem, made = state(config), facts(config)
-        workers = Workers(config.parallel.workers, folder / UNFINISHED, config.parallel.address)
+        workers = Workers(config.parallel.workers, folder / UNFINISHED, config.parallel.address, config.parallel.wait)
         workers.check()
     with stages("solve"), console.progress(config.name) as progress:
         solutions, seconds = solve(problem, config, Context(config.seed, workers, progress))

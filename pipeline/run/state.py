@@ -29,6 +29,8 @@ def state(config: RunConfig) -> Problem:
     problem = prepare(config)
     for name in config.methods:
         why = METHODS[name].why_not(problem, config.method.of(name))
+        if why and METHODS[name].serves.why_not(problem) is None:  # its own options are at fault
+            raise ConfigError(why)
         if why:
             served = [m.name for m in METHODS.values() if not m.why_not(problem, config.method.of(m.name))]
             raise ConfigError(f"{why}; methods that serve this problem: {', '.join(served)}")

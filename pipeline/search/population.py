@@ -10,9 +10,10 @@ import numpy as np
 
 from pipeline.common.arrays import Array
 from pipeline.model.arm import Arm
-from pipeline.model.kinematics import project, wrap
+from pipeline.model.kinematics import project
 from pipeline.problem.costs import objective_values
 from pipeline.problem.problem import Boundary, Problem
+from pipeline.problem.turns import full_turns
 
 
 def random_inverse_weights(rng: np.random.Generator, count: int, n: int) -> Array:
@@ -62,10 +63,10 @@ def population(problem: Problem, times: Array, starts: Array, count: int, rng: n
 def _close(problem: Problem, times: Array, motions: Array) -> Array:
     """Spread the gap between end and start of each motion over its knots, and put the knots back on the path."""
     arm = problem.task.arm
-    gap = wrap(motions[:, -1] - motions[:, 0], arm.description.revolute)
+    turns = full_turns(problem, motions[:, 0], motions[:, -1])
+    gap = motions[:, -1] - motions[:, 0] - turns
     gap[:, : arm.base.count] = 0.0
     ramp = np.linspace(0.0, 1.0, len(times))[:, None]
-    # A motion that comes back wound by a full turn is not closed by this; it stays as it is and its gap decides.
     moved = motions - ramp * gap[:, None, :]
     if arm.base.count:
         return _refloat(arm, times, moved)
@@ -73,7 +74,9 @@ def _close(problem: Problem, times: Array, motions: Array) -> Array:
     target = np.tile(problem.reference.position(times), (count, 1))
     closed, error = project(problem.task, moved.reshape(-1, n), target, tolerance=1e-9)
     closed = closed.reshape(moved.shape)
-    fine = (error.reshape(count, knots).max(axis=1) < 1e-6) & (np.abs(closed[:, -1] - closed[:, 0]).max(axis=1) < 1e-6)
+    fine = (error.reshape(count, knots).max(axis=1) < 1e-6) & (
+        np.abs(closed[:, -1] - closed[:, 0] - turns).max(axis=1) < 1e-6
+    )
     return closed[fine]
 
 

@@ -38,6 +38,9 @@ MOST_STEPS = 4000
 NUDGE = 1e-9  # [m] from a critical task point to one with a regular manifold
 
 
+ENOUGH = 100  # random configurations, none of which arrives at a point that is out of reach
+
+
 @dataclass(frozen=True)
 class Loop:
     """One closed curve of the manifold: nodes q (K, n) [rad], unit tangents (K, n), arc length s (K,) and in all [rad].
@@ -104,8 +107,7 @@ def manifolds(
             beside = x[i : i + 1] + NUDGE * direction / np.linalg.norm(direction)
             traced[i] = traced[i] or _all_loops(task, beside, _seeds(task, beside, rng, seeds, random_seeds))[0]
         if not traced[i]:
-            point = ", ".join(f"{v:.4g}" for v in x[i])
-            raise PathError(f"point {i + 1} of {len(x)} of the path ({point}) m is out of the arm's reach")
+            raise PathError(_why_none(task, x, i, rng))
     if spacing is None:
         spacing = max(sum(loop.length for loop in loops) for loops in traced) / (nodes or 180)
     return _resample(task, x, traced, spacing)
@@ -114,6 +116,15 @@ def manifolds(
 def on_manifold(task: Task, loop: Loop, s: Array, x: Array) -> Array:
     """Configurations (P, n) at arc lengths s (P,) of the loop, closed on its task point x (m,)."""
     return close_gap(task, loop.interpolate(s), np.broadcast_to(x, (len(s), task.m)), steps=10, tolerance=1e-14)[0]
+
+
+def _why_none(task: Task, x: Array, i: int, rng: np.random.Generator) -> str:
+    """What is known of point i of x, of whose manifold no loop was found."""
+    arrived = len(_seeds(task, x[i : i + 1], rng, None, ENOUGH)[0])
+    point = f"point {i + 1} of {len(x)} of the path ({', '.join(f'{v:.4g}' for v in x[i])}) m"
+    if not arrived:
+        return f"{point} is out of the arm's reach: none of {ENOUGH} attempts, from anywhere, arrives there"
+    return f"{point}: no self-motion that closes was found there, although {arrived} of {ENOUGH} attempts arrive"
 
 
 # --- finding every loop ---------------------------------------------------------------------------------------------
@@ -260,7 +271,7 @@ def _resample(task: Task, x: Array, traced: list[list[Loop]], spacing: float) ->
     target = np.repeat(x, [sum(of_point) for of_point in counts], axis=0)
     q, on = close_gap(task, np.concatenate(rough), target, steps=30, tolerance=CLOSED)
     if not on.all():
-        raise PathError(f"the self-motion manifold cannot be followed at the task point {target[~on][0]}")
+        raise PathError(f"the self-motion manifold was lost at the task point {target[~on][0]}, where it was sampled")
     ways = tangent(task.jacobian(q))
     revolute = task.arm.description.revolute
     q = wrap_angles(q, revolute)

@@ -24,12 +24,13 @@ from pydrake.trajectories import PiecewisePolynomial
 
 from pipeline.common.arrays import Array
 from pipeline.config.studies import ClosedLoopConfig
+from pipeline.evaluation.curve import curve
 from pipeline.evaluation.evaluation import Evaluation
 from pipeline.model.arm import Arm
 from pipeline.model.stack import assemble
 from pipeline.problem.problem import Problem
 from pipeline.studies import style
-from pipeline.studies.export import chosen, curve
+from pipeline.studies.export import chosen
 from pipeline.studies.study import Motions, Result
 
 DIVERGED = 3.0  # [rad] of a joint from its reference: the simulation is stopped
@@ -106,10 +107,21 @@ class ClosedLoop(Result):
         return {"closed_loop": draw(self, title)}
 
 
-def study(motions: Motions) -> ClosedLoop | None:
-    """Where it is asked for and there is a motion to export."""
+class NotRun(Result):
+    """There is no motion to follow."""
+
+    name = "closed_loop"
+
+    def section(self) -> list[str]:
+        return ["Closed loop: not simulated, since no motion is exported."]
+
+
+def study(motions: Motions) -> Result | None:
+    """Where it is asked for."""
     config, motion = motions.config.closed_loop, chosen(motions)
-    return None if motion is None or not config.run else simulate(motions.problem, motion, config)
+    if not config.run:
+        return None
+    return NotRun() if motion is None else simulate(motions.problem, motion, config)
 
 
 def effort_limits(problem: Problem) -> Array:

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from pipeline.common.arrays import Array
 from pipeline.evaluation.between import audit
+from pipeline.evaluation.curve import curve, whole
 from pipeline.evaluation.evaluation import Evaluation
 from pipeline.evaluation.limits import LIMITS
-from pipeline.problem.problem import Boundary, Problem
+from pipeline.problem.problem import Problem
 from pipeline.studies.study import Motions, Result
 
 TOLERANCE = 1e-6  # relative: of limits that are met
@@ -70,7 +70,11 @@ class Nothing(Result):
     name = "export"
 
     def section(self) -> list[str]:
-        return ["Exported: nothing, since no confirmed motion keeps every limit (export.method names one anyway)."]
+        return [
+            "Exported: nothing, since no confirmed motion keeps every limit and its path, to path.tolerance between "
+            "its knots too "
+            "(export.method names one anyway)."
+        ]
 
 
 def study(motions: Motions) -> Result | None:
@@ -84,39 +88,21 @@ def study(motions: Motions) -> Result | None:
 def chosen(motions: Motions) -> Evaluation | None:
     """The motion to export; None if there is no confirmed one, or none is asked for.
 
-    The best one keeps every limit and every clearance at its knots: a method that knows none may go cheaply through a
-    wall. Of a method with several optima, and of all methods, it is the cheapest by the problem's own objective.
+    The best one keeps every limit and every clearance at its knots, and its path between them too: a method that knows
+    none may go cheaply through a wall. Of a method with several optima, and of all methods, it is the cheapest by the
+    problem's own objective.
     """
     asked = motions.config.export.method
     good = [e for e in motions.solved if asked in ("best", e.method)]
     if asked == "best":
-        good = [e for e in good if max(e.limit_excess.values(), default=0.0) <= LIMITS]
+        good = [e for e in good if max(e.limit_excess.values(), default=0.0) <= LIMITS and e.on_path]
     return min(good, key=lambda e: e.objective, default=None)
-
-
-def curve(problem: Problem, time: Array, q: Array) -> CubicSpline:
-    """The C2 spline through the knots: from rest to rest for a path at rest, periodic for a cycle."""
-    if problem.boundary is Boundary.CYCLIC:
-        turns = np.rint((q[-1] - q[0]) / (2 * np.pi)) * 2 * np.pi
-        if not np.any(turns):
-            closed = q.copy()
-            closed[-1] = closed[0]
-            return CubicSpline(time, closed, bc_type="periodic")
-    return CubicSpline(time, q, bc_type="clamped" if problem.reference.timing.at_rest else "not-a-knot")
-
-
-def _whole(problem: Problem, evaluation: Evaluation) -> Callable[..., Array]:
-    """The same curve with a moving base's coordinates before the joints'."""
-    nb, joints = problem.task.arm.base.count, curve(problem, evaluation.time, evaluation.q)
-    if not nb:
-        return joints
-    base = CubicSpline(evaluation.time, evaluation.solution.trajectory.q[:, :nb])
-    return lambda time, order=0: np.hstack([base(time, order), joints(time, order)])
 
 
 def resample(problem: Problem, evaluation: Evaluation, rate: float) -> Resampled:
     """The motion at `rate` [Hz], its last sample at exactly T."""
-    spline, everything = curve(problem, evaluation.time, evaluation.q), _whole(problem, evaluation)
+    spline = curve(problem, evaluation.time, evaluation.q)
+    everything = whole(problem, evaluation.time, evaluation.solution.trajectory.q)
     duration = float(evaluation.time[-1])
     time = np.append(np.arange(0.0, duration - 1e-9, 1.0 / rate), duration)
     q, qd, qdd = spline(time), spline(time, 1), spline(time, 2)

@@ -108,8 +108,8 @@ def test_way_points_with_orientations(tmp_path: Path, header: str) -> None:
     assert motion.status is Status.SOLVED
     end = problem.task.arm.pose(motion.q[[-1]])[1][0]
     assert (TURNS[-1].inv() * Rotation.from_matrix(end)).magnitude() < 1e-3
-    # A task without an orientation takes the points alone.
-    assert prepare(composed(*words)).reference.orientation is None
+    with pytest.raises(ConfigError, match="has orientations, and the task prescribes none"):
+        prepare(composed(*words))
 
 
 def test_orientations_that_contradict(tmp_path: Path) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import json
 import os
-import pickle
 import signal
 import socket
 import subprocess
@@ -24,6 +23,7 @@ from distributed import Client
 
 from pipeline.build.problem import prepare
 from pipeline.common import cluster
+from pipeline.common import kept as stored
 from pipeline.common.errors import ConfigError
 from pipeline.common.workers import Workers
 from pipeline.config import run as config
@@ -153,7 +153,7 @@ def test_the_planner_gives_the_same_as_here(two_workers: Cluster, tmp_path: Path
     asked = config.check(SIM1)
     ways = [Workers(1), Workers(2), Workers(store=tmp_path, address=two_workers.address)]
     solved = [global_planner(prepare(asked), asked.method.global_, Context(1, workers)) for workers in ways]
-    assert list(tmp_path.glob("*.pickle"))
+    assert list(tmp_path.glob("*.result"))
     assert len({len(solutions) for solutions in solved}) == 1
     for one, two, there in zip(*solved, strict=True):
         np.testing.assert_array_equal(one.trajectory.q, two.trajectory.q)
@@ -241,7 +241,7 @@ def test_a_killed_run_goes_on_elsewhere(
 
     killed, whole = tmp_path / "killed", tmp_path / "whole"
     run_and_kill(killed, 3, *words, *there, f"hydra.run.dir={killed}", cwd=tmp_path)
-    finished = [pickle.loads(file.read_bytes()) for file in kept(killed / UNFINISHED)]
+    finished = [stored.loads(file.read_bytes()) for file in kept(killed / UNFINISHED)]
     assert call(monkeypatch, capfd, *words, *here, f"hydra.run.dir={killed}").code == 0
     assert call(monkeypatch, capfd, *words, *there, f"hydra.run.dir={whole}").code == 0
     tables = [pd.read_parquet(folder / "trajectories.parquet") for folder in (killed, whole)]

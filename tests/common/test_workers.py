@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-import pickle
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +11,10 @@ import pandas as pd
 import pytest
 
 from pipeline.build.problem import prepare
+from pipeline.common import kept as stored
+from pipeline.common import versions
 from pipeline.common import workers as workers_module
+from pipeline.common.errors import WorkerError
 from pipeline.common.workers import Workers
 from pipeline.config import run as config
 from pipeline.methods import method
@@ -20,7 +23,7 @@ from pipeline.run.run import UNFINISHED
 from tests.commands import call
 from tests.killed import run_and_kill
 from tests.support import RUN_FILES
-from tests.tasks import Context, calls, fail_at_three, in_pairs, kept, multiply, nothing
+from tests.tasks import Context, calls, die_once, fail_at_three, in_pairs, kept, multiply, nothing
 
 
 @pytest.mark.parametrize("count", [1, 2, 8])
@@ -96,7 +99,7 @@ def spoilt(content: bytes, how: str) -> bytes:
         return content[: len(content) // 2]
     if how == "foreign":
         return b"something else\n" * 10
-    at = content.index(np.float64(7.5).tobytes())  # one bit within the numbers: still a good pickle
+    at = content.index(np.float64(7.5).tobytes())  # one bit within the numbers: still a good array
     return content[:at] + bytes([content[at] ^ 1]) + content[at + 1 :]
 
 
@@ -178,7 +181,7 @@ def test_a_killed_run_goes_on(
 
     killed = tmp_path / "killed"
     run_and_kill(killed, 3, *words, f"hydra.run.dir={killed}", cwd=tmp_path)
-    finished = [pickle.loads(file.read_bytes()) for file in kept(killed / UNFINISHED)]
+    finished = [stored.loads(file.read_bytes()) for file in kept(killed / UNFINISHED)]
     assert not list(killed.glob("*.csv"))
     assert not list(killed.glob("*.parquet"))
     assert not list(killed.glob("*.rrd"))
@@ -201,3 +204,34 @@ def test_a_killed_run_goes_on(
     for optimum in finished:
         payload = optimum if hasattr(optimum, "solves") else optimum[-1]
         assert {solve["wall_time_s"] for solve in payload.solves} <= times
+
+
+def test_a_killed_worker_process_is_replaced_once(tmp_path: Path) -> None:
+    """What was finished is not done again; what kills its process every time is one line."""
+    workers = Workers(2, tmp_path / "store")
+    assert workers.map(die_once, Context(tmp_path), [1.0, 2.0, 3.0]) == [1.0, 2.0, 3.0]
+    (tmp_path / "always").touch()
+    with pytest.raises(WorkerError, match=r"^parallel\.workers = 2: .*killed twice"):
+        workers.map(die_once, Context(tmp_path, 2.0), [3.0, 4.0])
+
+
+@dataclass(frozen=True)
+class Unsure:
+    final: bool
+
+
+def unsure(context: Context, item: float) -> Unsure:
+    multiply(context, item)
+    return Unsure(final=False)
+
+
+def test_what_a_clock_has_stopped_is_not_kept(tmp_path: Path) -> None:
+    for _ in range(2):
+        Workers(1, tmp_path / "store").map(unsure, Context(tmp_path), [1.0])
+    assert calls(tmp_path) == [1.0, 1.0]
+
+
+def test_other_source_is_other_work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(versions, "source", lambda: "another")
+    assert "source another" in versions.stamp.__wrapped__()
+    assert versions.versions()["source"] == "another"

@@ -155,7 +155,7 @@ def test_an_attitude_that_is_exceeded_is_named() -> None:
     e = evaluate(bounded, solution)
     assert found.reached == pytest.approx(e.base.turn.max(), rel=1e-6)
     assert found.relative == pytest.approx(e.limit_excess["attitude"], rel=1e-6)
-    assert "the attitude limit of the base (0.01 rad) cannot be met" in found.sentence
+    assert found.bound == "the attitude limit of the base (0.01 rad)"
     assert e.status is Status.UNCONFIRMED
     assert "attitude limit is exceeded" in e.message
     relaxed = least_violation(bounded, problem.times, [solution.trajectory.q])

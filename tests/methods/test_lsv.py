@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 
 from pipeline.common.arrays import Array
+from pipeline.common.errors import InputError
 from pipeline.config.methods import LsvOptions
 from pipeline.evaluation.evaluation import evaluate
-from pipeline.methods.lsv import lsv
+from pipeline.methods.lsv import inertia_weighted, lsv
+from pipeline.methods.method import Method
 from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Solution, Status
 
@@ -57,11 +59,16 @@ def test_the_gain_takes_the_drift_away(problem: Make, number: int) -> None:
     assert strong < weak < 0.7 * free
 
 
-def test_a_gain_too_large_for_the_step_is_not_passed_off_as_a_motion(problem: Make) -> None:
+@pytest.mark.parametrize("method", [lsv, inertia_weighted])
+def test_a_gain_too_large_for_the_step_is_refused(problem: Make, method: Method) -> None:
+    """Below 2 / dt the error still dies out, from there on it grows."""
     asked = problem(1, 100)
-    result = evaluate(asked, lsv(asked, LsvOptions(dt=0.05, gain=50.0))[0])
-    assert result.tracking_error.max() > 0.1
-    assert result.status is not Status.SOLVED
+    below = evaluate(asked, method(asked, LsvOptions(dt=0.05, gain=36.0))[0])
+    assert below.status is Status.SOLVED
+    with pytest.raises(InputError, match=rf"method\.{method.name}\.gain = 40 1/s diverges: .* below 2 / dt = 40 1/s"):
+        method(asked, LsvOptions(dt=0.05, gain=40.0))
+    with pytest.raises(InputError, match=r"by -1\.5"):
+        method(asked, LsvOptions(dt=0.05, gain=50.0))
 
 
 @pytest.mark.parametrize("dt", [0.03, 20.0])

@@ -119,7 +119,7 @@ def test_an_obstacle_on_the_path_is_named() -> None:
     solution = global_planner(prepare(blocked), blocked.method.global_)[0]
     assert not solution.found
     assert "clearance limit of link" in solution.message
-    assert "from wall (0.01 m) cannot be met" in solution.message
+    assert "from wall (0.01 m); the least violation found is" in solution.message
 
 
 def test_no_shapes_no_obstacles() -> None:

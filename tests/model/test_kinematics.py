@@ -71,9 +71,17 @@ def test_project_gets_off_a_singular_start(task: PositionTask) -> None:
 def test_place_finds_the_start_or_says_how_far_it_is(task: PositionTask, q_init: Array) -> None:
     start = task.value(q_init[None])[0] + np.array([-0.05, 0.03])
     np.testing.assert_allclose(task.value(place(task, q_init, start)[None])[0], start, atol=1e-10)
-    with pytest.raises(PathError, match=r"start \(2, 0\) m is out of reach: .* m of it from robot.q_init") as caught:
+    far = 2.0 - 0.489  # less the arm's length
+    with pytest.raises(PathError, match=rf"start \(2, 0\) m is out of reach: .* ends {far:.3g} m from it") as caught:
         place(task, q_init, np.array([2.0, 0.0]))
     assert "\n" not in str(caught.value)
+
+
+def test_a_stretched_arm_is_placed_on_its_own_axis(task: PositionTask) -> None:
+    """No least step leads there from a straight arm: its Jacobian knows no way inwards."""
+    start = np.array([0.3, 0.0])
+    assert project(task, np.zeros((1, 3)), start[None])[1][0] > 0.1
+    np.testing.assert_allclose(task.value(place(task, np.zeros(3), start)[None])[0], start, atol=1e-10)
 
 
 def test_singularity_watch_remembers_the_worst_moment() -> None:

@@ -158,8 +158,39 @@ def test_a_crash_of_a_single_run_is_not_hidden(
 
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(run_module, "solve", crash)
-    with pytest.raises(RuntimeError, match="a bug"):
-        call(monkeypatch, capfd, *LSV[1:4])
+    answer = call(monkeypatch, capfd, *LSV[1:4], "hydra.run.dir=out")
+    assert (answer.code, answer.error) == (1, "error: RuntimeError: a bug (see error.txt)\n")
+    assert "in crash" in (tmp_path / "out" / "error.txt").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "line"),
+    [
+        (SystemExit("Failure at a.cc:1 in F():\n  condition 'x' failed."), 1, "Drake: Failure at a.cc:1 in F(): "),
+        (MemoryError(), 1, "out of memory"),
+        (RecursionError(), 2, "nested too deeply"),
+        (OSError(28, "No space left on device", "run.json"), 2, "run.json: No space left on device"),
+        (UnicodeDecodeError("utf-8", b"\xff", 0, 1, "invalid start byte"), 2, "not UTF-8 text"),
+    ],
+)
+def test_what_ends_a_run_is_a_line_and_a_row(
+    error: BaseException, code: int, line: str, sweep: Sweep, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    solve = run_module.solve
+
+    def fails(problem: Problem, config: RunConfig, *more: object) -> object:
+        if config.seed == 2:
+            raise error
+        return solve(problem, config, *more)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(run_module, "solve", fails)
+    answer = sweep("path.length=0.1", "seed=2,1")
+    assert answer.code == code
+    assert len(answer.error.splitlines()) == 1
+    assert line in answer.error
+    rows = table(tmp_path)
+    assert list(rows["status"]) == ["error" if code == 1 else "bad input", "solved"]
+    assert line in rows["message"][0]
 
 
 def test_a_run_in_a_process_of_a_launcher_does_not_take_all_cores_for_itself() -> None:

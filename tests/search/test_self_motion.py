@@ -12,6 +12,7 @@ from pipeline.model.arm import Arm
 from pipeline.model.kinematics import wrap
 from pipeline.model.task import PositionTask
 from pipeline.robot import urdf
+from pipeline.search import self_motion
 from pipeline.search.configurations import KINDS, random_configurations
 from pipeline.search.self_motion import manifold, manifolds, on_manifold, tangent
 from tests.support import ROOT
@@ -155,9 +156,17 @@ def test_random_configurations_with_more_redundancy(spatial: PositionTask) -> No
 
 
 def test_errors(planar: PositionTask, spatial: PositionTask) -> None:
-    with pytest.raises(PathError, match="out of the arm's reach"):
+    with pytest.raises(PathError, match="out of the arm's reach: none of 100 attempts"):
         manifold(planar, np.array([0.6, 0.0]), np.random.default_rng(0))
     with pytest.raises(InputError, match="r = 2"):
         manifold(PositionTask(spatial.arm, ("x", "y")), np.zeros(2), np.random.default_rng(0))
     with pytest.raises(InputError, match="allowed are normal"):
         random_configurations(planar, Q_INIT, 3, np.random.default_rng(0), "sobol")
+
+
+def test_a_point_without_a_closed_self_motion_is_not_called_out_of_reach(
+    planar: PositionTask, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(self_motion, "_all_loops", lambda task, x, seeds: [[] for _ in x])
+    with pytest.raises(PathError, match=r"no self-motion that closes was found there, although \d+ of 100 attempts"):
+        manifold(planar, np.array([0.3, 0.1]), np.random.default_rng(0))

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from pipeline.artifacts.recording.arm import columns, draw_arm, strict
+from pipeline.artifacts.recording.arm import columns, draw_arm
 from pipeline.artifacts.recording.blueprint import BACKGROUND, GRID, pixels
+from pipeline.artifacts.recording.stream import record
 from pipeline.common.arrays import Array
 from pipeline.model.arm import Arm
 from pipeline.studies import style
@@ -20,8 +21,6 @@ COLOR = (70, 120, 170, 255)
 
 def write(file: Path, arm: Arm, time: Array, q: Array, *, name: str) -> None:
     """Write `file` (.rrd), or raise and leave nothing behind. time (K,) [s], q (K, n)."""
-    file.parent.mkdir(parents=True, exist_ok=True)
-    temporary = file.with_name(f"{file.name}.tmp")
     tip = arm.position(q)
     around = np.vstack([tip, arm.mounting.base_position])
     center = (around.min(axis=0) + around.max(axis=0)) / 2
@@ -44,19 +43,17 @@ def write(file: Path, arm: Arm, time: Array, q: Array, *, name: str) -> None:
         auto_views=False,
         auto_layout=False,
     )
-    try:
-        with strict(), rr.RecordingStream("selfmotion") as recording:
-            recording.save(temporary, default_blueprint=layout)
-            recording.send_recording_name(name)
-            recording.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-            draw_arm(recording, arm, "arm", COLOR, columns(time), q)
-            recording.log("end_effector", rr.Points3D.from_fields(radii=pixels(6.0), colors=(200, 40, 40)), static=True)
-            recording.send_columns("end_effector", columns(time), rr.Points3D.columns(positions=tip))
-            names = list(arm.description.joints)
-            shades = [tuple(int(style.joint_color(j)[i : i + 2], 16) for i in (1, 3, 5)) for j in range(arm.n)]
-            lines = rr.SeriesLines(names=names, colors=shades, widths=2.0)
-            recording.log("joint_position", lines, static=True)
-            recording.send_columns("joint_position", columns(time), rr.Scalars.columns(scalars=q))
-        os.replace(temporary, file)
-    finally:
-        temporary.unlink(missing_ok=True)
+
+    def fill(recording: Any) -> None:
+        recording.send_recording_name(name)
+        recording.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+        draw_arm(recording, arm, "arm", COLOR, columns(time), q)
+        recording.log("end_effector", rr.Points3D.from_fields(radii=pixels(6.0), colors=(200, 40, 40)), static=True)
+        recording.send_columns("end_effector", columns(time), rr.Points3D.columns(positions=tip))
+        names = list(arm.description.joints)
+        shades = [tuple(int(style.joint_color(j)[i : i + 2], 16) for i in (1, 3, 5)) for j in range(arm.n)]
+        lines = rr.SeriesLines(names=names, colors=shades, widths=2.0)
+        recording.log("joint_position", lines, static=True)
+        recording.send_columns("joint_position", columns(time), rr.Scalars.columns(scalars=q))
+
+    record(file, layout, fill)

@@ -7,7 +7,6 @@ pictures `/lsv/stick`, `trace`, `end_effector` and `/lsv/<robot>`. SI units thro
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -20,8 +19,9 @@ from scipy.spatial.transform import Rotation
 
 from pipeline.artifacts.figures.solids import outline
 from pipeline.artifacts.recording import blueprint
-from pipeline.artifacts.recording.arm import columns, draw_arm, strict
+from pipeline.artifacts.recording.arm import columns, draw_arm
 from pipeline.artifacts.recording.blueprint import faded, pixels, rgba, slug
+from pipeline.artifacts.recording.stream import record
 from pipeline.artifacts.report import Report
 from pipeline.artifacts.scene import box, corners, outlines
 from pipeline.artifacts.summary import text
@@ -68,27 +68,23 @@ def save(
     summary: Markdown, shown beside the plots. properties: facts of the run, stored as the recording's property `run`.
     picture: a PNG to show first, such as the Pareto front (2-D views have no axes of their own).
     """
-    temporary = file.with_name(f"{file.name}.tmp")
-    try:
-        with strict(), rr.RecordingStream("selfmotion") as recording:
-            recording.save(temporary, default_blueprint=_layout(problem, evaluations, picture))
-            recording.send_recording_name(name)
-            if facts := _facts(properties):
-                recording.send_property("run", facts)
-            document = rr.TextDocument(summary, media_type=rr.MediaType.MARKDOWN)
-            recording.log("summary", document, static=True)
-            if picture is not None:
-                recording.log("picture", rr.EncodedImage(path=picture), static=True)
-            _send_reference(recording, problem)
-            if problem.obstacles is not None:
-                send_obstacles(recording, problem.obstacles.shapes, _planar(problem))
-            for evaluation in evaluations:
-                _send_series(recording, problem, evaluation)
-                _send_motion(recording, problem, evaluation)
-        RrdReader(temporary).store()  # raises without the footer: a disk that fills up at the very end goes unreported
-        os.replace(temporary, file)
-    finally:
-        temporary.unlink(missing_ok=True)
+
+    def fill(recording: Any) -> None:
+        recording.send_recording_name(name)
+        if facts := _facts(properties):
+            recording.send_property("run", facts)
+        document = rr.TextDocument(summary, media_type=rr.MediaType.MARKDOWN)
+        recording.log("summary", document, static=True)
+        if picture is not None:
+            recording.log("picture", rr.EncodedImage(path=picture), static=True)
+        _send_reference(recording, problem)
+        if problem.obstacles is not None:
+            send_obstacles(recording, problem.obstacles.shapes, _planar(problem))
+        for evaluation in evaluations:
+            _send_series(recording, problem, evaluation)
+            _send_motion(recording, problem, evaluation)
+
+    record(file, _layout(problem, evaluations, picture), fill)
 
 
 def read_series(file: Path, entity: str) -> tuple[Array, Array]:

@@ -18,6 +18,7 @@ from pipeline.problem.lagrangian import Lagrangian
 from pipeline.problem.objective import Objective
 from pipeline.problem.problem import Problem
 from pipeline.program.feasibility import violations
+from pipeline.program.ipopt import STOPPED
 from pipeline.program.transcription import transcribe
 
 # What a coarse grid's optimum needs to be told apart and refined; only the last grid's is reported.
@@ -55,6 +56,11 @@ class Optimum:
     status: str
     continuous: bool = True  # False: between its knots the motion leaves the path, it jumps from branch to branch
     solves: list[dict[str, Any]] = field(default_factory=list)
+
+    @property
+    def final(self) -> bool:
+        """Whether it would come out the same again: no clock has stopped a solve that led to it."""
+        return all(solve.get("status") != STOPPED for solve in self.solves)
 
 
 def first_order(problem: Problem) -> Problem:
@@ -143,6 +149,7 @@ def optimise(problem: Problem, times: Array, guess: Array, options: GlobalOption
     q, outcome, iterations = program.solve(
         tolerance=options.tolerance if last else max(options.tolerance, ROUGH_TOLERANCE),
         max_iterations=options.max_iterations if last else min(options.max_iterations, ROUGH_ITERATIONS),
+        max_time=options.max_time,
         extra=None if last else ROUGH,
     )
     cost = float(objective_values(problem, times, q[None])[0])

@@ -7,7 +7,6 @@ step.
 
 from __future__ import annotations
 
-from collections import Counter
 from typing import Any
 
 import numpy as np
@@ -18,6 +17,7 @@ from pipeline.config.methods import GlobalOptions
 from pipeline.methods import dynamic_programming
 from pipeline.methods.global_planner.batch import Batch
 from pipeline.methods.global_planner.optimum import Optimum, go_on, optimise_start, refine
+from pipeline.methods.global_planner.reasons import no_feasible, no_optimum, no_start
 from pipeline.methods.method import ANY, Context, Method
 from pipeline.model.kinematics import wrap
 from pipeline.problem.limits import LIMIT_KINDS
@@ -61,8 +61,7 @@ def solve(problem: Problem, options: GlobalOptions, context: Context) -> list[So
     grids = refinement(problem.times, options.coarse_steps or (STEPS if why is None else STEPS_ALONE))
     motions, log = _starts(problem, grids[0], options, np.random.default_rng(context.seed))
     if not len(motions):
-        message = "none of the motions that were drawn follows the path to its end; it may leave the reach of the arm"
-        return [_nothing(problem, Status.INFEASIBLE, message, log)]
+        return [_nothing(problem, Status.INFEASIBLE, no_start(problem, log.get("drawn", 0)), log)]
 
     batch = Batch(problem, options) if why is None else None
     log["solver"] = "newton, confirmed by ipopt" if why is None else f"ipopt ({why})"
@@ -76,7 +75,7 @@ def solve(problem: Problem, options: GlobalOptions, context: Context) -> list[So
             if starts[-1].converged:
                 break
         elif relaxed is not None and (relaxed.worst.relative > HOPELESS or len(grids) == 1):
-            return [_nothing(problem, Status.INFEASIBLE, relaxed.worst.sentence, log)]
+            return [_nothing(problem, Status.INFEASIBLE, no_feasible(len(motions), relaxed), log)]
         if len(grids) == 1:
             break
         # A coarse grid can be infeasible where a finer one is not: its finite differences are other numbers.
@@ -91,7 +90,7 @@ def solve(problem: Problem, options: GlobalOptions, context: Context) -> list[So
     found = [(fine, coarse) for fine, coarse in zip(refined, basins, strict=True) if fine.converged and fine.continuous]
     log["jumping_optima"] = sum(fine.converged and not fine.continuous for fine in refined)
     if not found:
-        return [_nothing(problem, Status.NOT_CONVERGED, _why(starts, refined), log)]
+        return [_nothing(problem, Status.NOT_CONVERGED, no_optimum(problem, grids[0], starts, refined), log)]
     ranked = [found[index] for index in _distinct([fine for fine, _ in found], options, problem)]
     solutions = []
     for rank, (fine, coarse) in enumerate(ranked):
@@ -152,7 +151,7 @@ def _starts(
         configurations = starting_points(problem, options.configurations, rng, options.draw)
         count = options.candidates or (len(coarse) * problem.task.arm.n) ** 2
         motions = population(problem, coarse, configurations, count, rng)
-        log |= {"configurations": len(configurations), "candidates": len(motions)}
+        log |= {"configurations": len(configurations), "drawn": count, "candidates": len(motions)}
         if len(motions):
             costs = ranking(problem, coarse, motions, options.limit_weight)
             parts.append(motions[diverse(motions, costs, options.optimised, options.same_path, revolute)])
@@ -242,14 +241,3 @@ def _relaxed(problem: Problem, times: Array, motions: Array) -> Relaxed | None:
     if not problem.constrained:
         return None
     return least_violation(problem, times, list(motions[:ELASTIC_STARTS]))
-
-
-def _why(starts: list[Optimum], refined: list[Optimum]) -> str:
-    """Why there is no optimum although there are starts, in the solver's own words."""
-    if any(start.converged for start in starts):
-        words = "; ".join(
-            sorted({optimum.status if not optimum.converged else "jumps between branches" for optimum in refined})
-        )
-        return f"{len(refined)} optima of the coarse grid were lost on a finer one ({words})"
-    words = Counter(start.status for start in starts).most_common(1)[0][0]
-    return f"none of {len(starts)} starts converged (most often: {words})"

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import time as clock
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from scipy.interpolate import BSpline, make_interp_spline
 
 from pipeline.common.arrays import Array
 from pipeline.config.methods import PmkeOptions
+from pipeline.methods.correction import diverges
 from pipeline.methods.method import ANY, Context, Method
 from pipeline.methods.pmke.prediction import path_weight, rollout, solve_window, window_objective
 from pipeline.methods.pmke.window import Window
@@ -35,7 +37,7 @@ def solve(problem: Problem, options: PmkeOptions, context: Context) -> list[Solu
     return [_follow(problem, options)]
 
 
-pmke = Method("pmke", "PMKE", "#2B6CB0", PmkeOptions, ANY, solve)
+pmke = Method("pmke", "PMKE", "#2B6CB0", PmkeOptions, ANY, solve, partial(diverges, "pmke"))
 
 
 def _follow(problem: Problem, options: PmkeOptions) -> Solution:

@@ -80,7 +80,7 @@ def _follow(problem: Problem, options: RecedingOptions) -> Solution:
         elif planned < min(i + every, count):
             return _given_up(_why(window), options, times, q[: i + 1], log)
     failed = sum(not entry["converged"] for entry in log)
-    message = f"{failed} of {len(log)} windows had no solution: the plan before was followed there" if failed else ""
+    message = f"{failed} of {len(log)} windows were not solved: the plan before was followed there" if failed else ""
     statistics = {
         "steps": count,
         "horizon": options.horizon,
@@ -156,9 +156,9 @@ def _given_up(message: str, options: RecedingOptions, times: Array, done: Array,
 
 
 def _why(window: Problem) -> str:
-    """The limit that leaves a window without a motion."""
+    """The limit that a window's motion was not found to keep."""
     targets = window.reference.position(window.times[1:])
     guess = np.vstack([window.q_init, rollout(window, window.q_init, targets)])
     relaxed = least_violation(window, window.times, [guess]) if window.constrained else None
-    why = "" if relaxed is None else f": {relaxed.worst.sentence}"
-    return f"the window from t = {window.times[0]:.3g} s on has no solution and no plan is left{why}"
+    why = "" if relaxed is None or relaxed.feasible else f": {relaxed.sentence}"
+    return f"no solution was found for the window from t = {window.times[0]:.3g} s on, and no plan is left{why}"

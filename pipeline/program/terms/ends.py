@@ -6,6 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from pipeline.problem.problem import Boundary
+from pipeline.problem.turns import full_turns
 from pipeline.program.program import Program
 from pipeline.program.scaling import POSITION_SCALE
 
@@ -22,7 +23,9 @@ def link(program: Program) -> None:
 
 
 def bound(program: Program) -> None:
-    """q(0) given, or q(T) = q(0); a base starts where it is, and one that is held stays there."""
+    """q(0) given, or q(T) = q(0) up to the full turns of the guess; a base starts where it is, a held one stays
+    there.
+    """
     start, nb = POSITION_SCALE * program.problem.q_init, program.nb
     if program.problem.boundary is Boundary.FIXED:
         program.drake.AddBoundingBoxConstraint(start, start, program.y[0])
@@ -35,4 +38,5 @@ def bound(program: Program) -> None:
         joints = program.n - nb
         closing = np.hstack([np.eye(joints), -np.eye(joints)])
         ends = np.concatenate([program.y[0, nb:], program.y[-1, nb:]])
-        program.drake.AddLinearEqualityConstraint(closing, np.zeros(joints), ends)
+        turns = POSITION_SCALE * full_turns(program.problem, program.guess.q[0], program.guess.q[-1])[nb:]
+        program.drake.AddLinearEqualityConstraint(closing, -turns, ends)

@@ -7,6 +7,7 @@ import pytest
 from scipy.interpolate import BSpline
 
 from pipeline.common.arrays import Array
+from pipeline.common.errors import InputError
 from pipeline.config.methods import LsvOptions, PmkeOptions
 from pipeline.evaluation.evaluation import evaluate
 from pipeline.methods.lsv import lsv
@@ -108,6 +109,11 @@ def test_a_prediction_at_every_step(problem: Make, update: float) -> None:
 def test_an_update_interval_beyond_the_motion_predicts_once(problem: Make) -> None:
     solution = pmke(problem(1, 100), PmkeOptions(dt=0.05, update_interval=100.0))[0]
     assert len(solution.statistics["predictions"]) == 1
+
+
+def test_a_gain_too_large_for_the_step_is_refused(problem: Make) -> None:
+    with pytest.raises(InputError, match=r"method\.pmke\.gain = 100 1/s diverges: .* below 2 / dt = 100 1/s"):
+        pmke(problem(1, 100), PmkeOptions(dt=0.02, gain=100.0))
 
 
 def test_the_gain_takes_the_drift_away(problem: Make) -> None:

@@ -1,0 +1,75 @@
+"""Why the planner has no motion, in one line: what was tried, how near it came, and what else to try."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+
+from pipeline.common.arrays import Array
+from pipeline.methods.global_planner.optimum import Optimum
+from pipeline.model.kinematics import ATTEMPTS, reach
+from pipeline.problem.problem import Problem
+from pipeline.program.feasibility import Relaxed, violations
+
+OTHERS = "more starts (method.global.optimised) or other ones (method.global.starts)"
+
+REACHED = 1e-6  # [m, rad]
+
+
+def no_start(problem: Problem, drawn: int) -> str:
+    """Of `drawn` motions none follows the path to its end, or dynamic programming has none (0). That the arm does not
+    reach the path is said only where that is so.
+    """
+    if not problem.task.arm.base.count:  # a base that moves goes along
+        left = reach(problem.task, problem.q_init, problem.reference.position(problem.times), REACHED)[1]
+        out = np.flatnonzero(left > REACHED)
+        if out.size:
+            return (
+                f"the path leaves the reach of the arm, first at t = {problem.times[out[0]]:.3g} s: the nearest of "
+                f"{ATTEMPTS} attempts misses it by up to {left.max():.3g} {_unit(problem)}"
+            )
+    if not drawn:
+        return f"no path through the grid of dynamic programming keeps the limits; try {OTHERS}"
+    return (
+        f"none of {drawn} motions that were drawn follows the path to its end; try other ones (method.global.starts), "
+        "more of them (method.global.candidates), or another robot.q_init: from a singular one many get stuck"
+    )
+
+
+def no_feasible(starts: int, relaxed: Relaxed) -> str:
+    """None of so many starts led to a motion that keeps its limits, nor did the attempts to exceed them least."""
+    led = f"none of {starts} starts led to one" if starts > 1 else "the one start did not lead to one"
+    return f"no feasible motion found: {led}, and {relaxed.sentence}; ease that limit, or try {OTHERS}"
+
+
+def no_optimum(problem: Problem, grid: Array, starts: list[Optimum], refined: list[Optimum]) -> str:
+    """There are starts, on `grid`, but no optimum: why, in the solver's own words."""
+    if any(start.converged for start in starts):
+        fates = {optimum.status if not optimum.converged else "jumps between branches" for optimum in refined}
+        return (
+            f"{len(refined)} optima of the coarse grid were lost on a finer one ({'; '.join(sorted(fates))}); "
+            "try more knots (timing.steps, method.global.coarse_steps)"
+        )
+    words = Counter(start.status for start in starts).most_common(1)[0][0]
+    return (
+        f"none of {len(starts)} starts converged (most often: {words}){_nearest(problem, grid, starts)}; "
+        f"try more iterations (method.global.max_iterations), {OTHERS}"
+    )
+
+
+def _nearest(problem: Problem, grid: Array, starts: list[Optimum]) -> str:
+    """How far the attempt that ended nearest to its path is from it, and from its limits."""
+    ended = [start.q for start in starts if np.isfinite(start.q).all()]
+    if not ended:
+        return ""
+    wanted = problem.reference.position(grid)
+    left = [float(np.abs(problem.task.error(q, wanted)).max()) for q in ended]
+    best = int(np.argmin(left))
+    worst = max(violations(problem, grid, ended[best]), key=lambda violation: violation.relative, default=None)
+    beyond = "" if worst is None or worst.relative <= REACHED else f" and exceeds {worst.bound} by {worst.extent}"
+    return f"; the best attempt is {left[best]:.2g} {_unit(problem)} off its path{beyond}"
+
+
+def _unit(problem: Problem) -> str:
+    return "m or rad" if problem.task.m > len(problem.task.axes) else "m"

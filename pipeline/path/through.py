@@ -1,0 +1,99 @@
+"""From way-points to a path: where it moves smoothly on, where it turns back or on the spot, and so comes to rest."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from pipeline.common.arrays import Array
+from pipeline.path.curves import Geometry, Still
+from pipeline.path.orientation import Orientation
+from pipeline.path.spline import Chain, Sampled, Spline
+
+TURN = 0.1  # [m/rad] what a turn on the spot counts of the path's length
+SAME = 1e-12  # [m] and [rad]: below it nothing moves
+BACK = np.deg2rad(170.0)  # a corner at least as sharp as that turns back
+FINE = 33  # samples between two way-points
+
+
+@dataclass(frozen=True)
+class Through:
+    """A path through way-points: the curve, its orientations or None, and by way-point (P,) where along it that lies
+    [m].
+
+    stops: indices of way-points between the first and the last at which the path comes to rest.
+    departure: the largest distance [m] of the curve from the way-points' polygon, and the way-point before it, from 1.
+    """
+
+    geometry: Geometry
+    orientation: Sampled | None
+    marks: Array
+    stops: tuple[int, ...]
+    departure: tuple[float, int]
+
+
+def through(points: Array, rotations: Rotation | None, *, rest: bool = False) -> Through:
+    """The path through points (P, m) [m] and rotations (P); equal neighbours are a dwell, of length zero.
+
+    It comes to rest where it turns back, before and after it turns on the spot, and with `rest` at every corner, so
+    that it is straight in between; elsewhere it is smooth.
+    """
+    moves, turns = steps(points, rotations)
+    kept = np.concatenate([[0], 1 + np.flatnonzero((moves > SAME) | (turns > SAME))])
+    where = np.cumsum(np.concatenate([[False], (moves > SAME) | (turns > SAME)]))  # (P,) the kept one of each
+    own, turned = points[kept], None if rotations is None else rotations[kept]
+    moves, turns = steps(own, turned)
+    breaks = [0, *(i for i in range(1, len(own) - 1) if rest or _stops(own, moves, i)), len(own) - 1]
+    pieces: list[Geometry] = []
+    oriented: list[Sampled] = []
+    marks, ends = np.zeros(len(own)), [0.0]
+    for first, last in pairwise(breaks):
+        part = slice(first, last + 1)
+        if moves[first] > SAME:
+            piece: Geometry = (spline := Spline(own[part], int(kept[first]) + 1))
+            local = spline.marks
+        else:
+            local = TURN * np.concatenate([[0.0], np.cumsum(turns[first:last])])
+            piece = Still(own[first], float(local[-1]))
+        pieces.append(piece)
+        if turned is not None:
+            oriented.append(Orientation(local, turned[part]))
+        marks[part] = ends[-1] + local
+        ends.append(ends[-1] + piece.length)
+    whole = len(pieces) > 1
+    geometry = Chain(pieces, np.array(ends)) if whole else pieces[0]
+    orientation = None if turned is None else Chain(oriented, np.array(ends)) if whole else oriented[0]
+    resting = {int(i) for i in np.flatnonzero(np.isin(where, breaks[1:-1]))}
+    return Through(geometry, orientation, marks[where], tuple(sorted(resting)), _departure(geometry, own, marks, kept))
+
+
+def steps(points: Array, rotations: Rotation | None) -> tuple[Array, Array]:
+    """How far it is from each way-point to the next (P - 1,), in space [m] and in orientation [rad]."""
+    moves = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    if rotations is None:
+        return moves, np.zeros(len(moves))
+    return moves, np.asarray((rotations[:-1].inv() * rotations[1:]).magnitude())
+
+
+def _stops(points: Array, moves: Array, i: int) -> bool:
+    """Whether the path cannot go smoothly through point i: it turns back, or on the spot on one side alone."""
+    before, after = moves[i - 1] > SAME, moves[i] > SAME
+    if not (before and after):
+        return bool(before or after)
+    cosine = (points[i] - points[i - 1]) @ (points[i + 1] - points[i]) / (moves[i - 1] * moves[i])
+    return bool(cosine < np.cos(BACK))
+
+
+def _departure(geometry: Geometry, points: Array, marks: Array, kept: Array) -> tuple[float, int]:
+    share = np.linspace(0.0, 1.0, FINE)
+    s = marks[:-1, None] + np.diff(marks)[:, None] * share
+    curve = geometry.sample(s.ravel())[0].reshape(len(s), FINE, -1)
+    start, chord = points[:-1, None], np.diff(points, axis=0)[:, None]
+    along = ((curve - start) * chord).sum(axis=2) / np.maximum((chord**2).sum(axis=2), SAME**2)
+    nearest = start + np.clip(along, 0.0, 1.0)[:, :, None] * chord
+    distance = np.linalg.norm(curve - nearest, axis=2).max(axis=1)
+    worst = int(np.argmax(distance))
+    return float(distance[worst]), int(kept[worst]) + 1

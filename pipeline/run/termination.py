@@ -1,0 +1,39 @@
+"""SIGTERM ends a run within two seconds, with exit code 143 and everything that is finished kept."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+
+CODE = 128 + signal.SIGTERM
+GRACE = 1.5  # [s] to leave in order; workers leave by themselves when this process is gone
+
+
+class Terminated(BaseException):
+    """Somebody has asked the process to end."""
+
+
+@contextmanager
+def terminable() -> Iterator[None]:
+    """Within it, SIGTERM raises Terminated in the main thread, and ends the process where that takes too long."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def leave(_: int, __: FrameType | None) -> None:
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)  # once is enough
+        last = threading.Timer(GRACE, os._exit, [CODE])
+        last.daemon = True
+        last.start()
+        raise Terminated
+
+    before = signal.signal(signal.SIGTERM, leave)
+    try:
+        yield
+    finally:
+        if signal.getsignal(signal.SIGTERM) is leave:
+            signal.signal(signal.SIGTERM, before)

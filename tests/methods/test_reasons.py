@@ -1,0 +1,89 @@
+"""Why the planner has no motion: what was tried and how near it came, and nothing that was not looked at."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.build.problem import prepare
+from pipeline.common.errors import ConfigError
+from pipeline.methods.global_planner.optimum import Optimum
+from pipeline.methods.global_planner.planner import global_planner
+from pipeline.methods.global_planner.reasons import no_feasible, no_optimum, no_start
+from pipeline.methods.method import Context
+from pipeline.path.curves import Line
+from pipeline.path.reference import Reference
+from pipeline.problem.problem import Problem
+from pipeline.problem.solution import Status
+from pipeline.program.feasibility import Relaxed, Violation
+from tests.support import composed
+
+INWARD = ("robot.q_init=[0,0,0]", "path.length=0.1", "path.direction=180", "timing.steps=13")
+
+
+def stated(*words: str) -> Problem:
+    return prepare(composed(*words))
+
+
+def test_motions_that_get_stuck_do_not_move_the_path_out_of_reach() -> None:
+    """From a straight arm no least step leads inwards: nothing that the population draws follows such a path."""
+    config = composed(*INWARD, "method.global.starts=population", "method.global.candidates=40")
+    (only,) = global_planner(prepare(config), config.method.global_, Context(1))
+    assert only.status is Status.INFEASIBLE
+    assert "none of 40 motions that were drawn" in only.message
+    assert "method.global.starts" in only.message
+    assert "reach" not in only.message
+
+
+def test_a_path_out_of_reach_is_said_with_where_and_by_how_much() -> None:
+    problem = stated("timing.steps=20", "timing=constant_speed", "timing.duration=2")
+    start = problem.reference.position(np.zeros(1))[0]
+    length = float(np.linalg.norm(problem.task.value(np.zeros((1, 3)))))
+    gone = replace(problem, reference=Reference(Line(start, np.array([1.0, 0.0]), 0.5), problem.reference.timing))
+    said = no_start(gone, 10)
+    far = np.linalg.norm(gone.reference.position(gone.times), axis=1) - length
+    assert f"leaves the reach of the arm, first at t = {gone.times[np.argmax(far > 0)]:.3g} s" in said
+    assert float(said.split("by up to ")[1].split()[0]) == pytest.approx(far.max(), rel=5e-3)
+
+
+def test_no_path_through_a_grid() -> None:
+    assert no_start(stated(), 0).startswith("no path through the grid of dynamic programming keeps the limits")
+
+
+@pytest.mark.parametrize(("attempts", "words"), [(1, "the one attempt"), (3, "none of 3 attempts")])
+def test_how_many_attempts_there_were(attempts: int, words: str) -> None:
+    worst = Violation("velocity", "elbow", 1.0, 1.5, 2.0, 0.5)
+    said = no_feasible(64, Relaxed(np.zeros((2, 3)), worst, attempts))
+    assert "none of 64 starts led to one" in said
+    assert words in said
+    assert "the velocity limit of elbow (1 rad/s); the least violation found is 50 % (1.5 rad/s at t = 2 s)" in said
+    assert "cannot" not in said
+
+
+def test_the_best_attempt_that_did_not_converge() -> None:
+    """The nearer of two to the path, how far it is from it, and what it exceeds."""
+    problem = stated("limits.velocity=0.01", "timing.steps=4")
+    wanted = problem.reference.position(problem.times)
+    still, bent = np.tile(problem.q_init, (5, 1)), np.tile(problem.q_init + 0.5, (5, 1))
+    still[-1, 1] += 0.1
+    off = [float(np.abs(problem.task.value(q) - wanted).max()) for q in (still, bent)]
+    assert off[0] < off[1]
+    lost = np.full((5, 3), np.nan)
+    starts = [Optimum(q, 1.0, False, "iteration limit") for q in (bent, still, lost)]
+    said = no_optimum(problem, problem.times, starts, [])
+    assert said.startswith("none of 3 starts converged (most often: iteration limit)")
+    assert (
+        f"the best attempt is {off[0]:.2g} m off its path and exceeds the velocity limit of joint2 (0.01 rad/s)" in said
+    )
+    speed = 0.1 / (problem.times[-1] - problem.times[-2])
+    assert f"({speed:.4g} rad/s at t = {problem.times[-1]:.3g} s)" in said
+    assert "best attempt" not in no_optimum(problem, problem.times, starts[2:], [])
+
+
+@pytest.mark.parametrize("method", ["global", "dynamic_programming", "pontryagin"])
+def test_motions_are_never_farther_apart_than_half_a_turn(method: str) -> None:
+    """With a larger measure of what is the same, no start would differ from the first."""
+    with pytest.raises(ConfigError, match=rf"method\.{method}\.same_path = .*: must be a number > 0 and <= 3\.14 rad"):
+        composed(f"method.{method}.same_path=1e9")
