@@ -127,8 +127,7 @@ def _read(path: WaypointsConfig, timing: TimingConfig, task: Task) -> Waypoints:
     if rows.rotations is not None and isinstance(task, PositionTask):
         raise ConfigError(
             f"{where} has orientations, and the task prescribes none; set robot.orientation to full or pointing, or "
-            "take "
-            "the columns out"
+            "take the columns out"
         )
     if rows.rotations is not None and (path.orientation is not None or any(path.turn)):
         raise ConfigError(f"path.orientation, path.turn: {where} has orientations of its own")
@@ -137,9 +136,8 @@ def _read(path: WaypointsConfig, timing: TimingConfig, task: Task) -> Waypoints:
         raise ConfigError(f"timing.law = from_file: {where} has no column time")
     if not stamped and rows.times is not None:
         raise ConfigError(
-            f"{where} has a column time, and timing.law = {timing.law} does not take it; set timing=from_file, or "
-            "take the "
-            "column out"
+            f"{where} has a column time, and timing.law = {timing.law} does not take it; set timing=from_file, or take "
+            "the column out"
         )
     moves, turns = steps(rows.points, rows.rotations)
     still = np.flatnonzero(np.maximum(moves, turns) <= SAME)
@@ -158,10 +156,8 @@ def _law(path: WaypointsConfig, timing: TimingConfig, found: Through, times: Arr
     if not law(timing.duration).at_rest:
         raise PathError(
             f"path.file = {path.file}: the path turns back, or on the spot, at way-point {found.stops[0] + 1} while "
-            "moving at "
-            f"{length / timing.duration:.3g} m/s (timing.law = {timing.law}); the laws raised_cosine and quintic come "
-            "to "
-            "rest there"
+            f"moving at {length / timing.duration:.3g} m/s (timing.law = {timing.law}); the laws raised_cosine and "
+            "quintic come to rest there"
         )
     between = [found.marks[i] / length for i in found.stops]
     return WithStops(law, timing.duration, (0.0, *map(float, between), 1.0))
@@ -173,8 +169,7 @@ def _notes(path: WaypointsConfig, found: Through) -> tuple[str, ...]:
     if distance > NEGLIGIBLE * found.geometry.length:
         notes.append(
             f"the smooth curve leaves the polygon of its way-points by up to {distance:.3g} m, between way-points "
-            f"{before} and "
-            f"{before + 1}; path.corners=rest goes straight, with a stop at each"
+            f"{before} and {before + 1}; path.corners=rest goes straight, with a stop at each"
         )
     if found.stops:
         shown_ones = ", ".join(str(i + 1) for i in found.stops[:8]) + ", ..." * (len(found.stops) > 8)

@@ -58,7 +58,7 @@ class OffPath:
 
     distance: float
     angle: float
-    at: tuple[float, float]
+    when: tuple[float, float]
 
 
 def off_path(problem: Problem, plant: SinglePlant, time: Array, q: Array) -> OffPath:
@@ -77,7 +77,7 @@ def off_path(problem: Problem, plant: SinglePlant, time: Array, q: Array) -> Off
 
 
 def steps_needed(problem: Problem, time: Array, off: float, allowed: float) -> int | None:
-    """How many even intervals would bring a curve that is `off` [m] its path on the knots `time` to within `allowed`.
+    """How many even intervals would bring a curve, `off` [m] its path on the knots `time`, to within `allowed`.
 
     The path itself, splined through its points at the knots, shows how that error falls with their number (as its
     fourth power, once they resolve it); the curve's is larger by a factor, measured on the knots it has, which tells
@@ -90,14 +90,12 @@ def steps_needed(problem: Problem, time: Array, off: float, allowed: float) -> i
 
 
 def _least(problem: Problem, low: int, allowed: float) -> int | None:
-    """The number of intervals, rounded up to two digits, on which the path's own spline is within `allowed` [m] of
-    it.
-    """
+    """The intervals, rounded up to two digits, on which the path's own spline is within `allowed` [m] of it."""
     high = MOST
     if not _of_path(problem, high) <= allowed:
         return None
     while high > 1.02 * low + 1:
-        middle = int(np.sqrt(low * high))
+        middle = max(low + 1, int(np.sqrt(low * high)))
         low, high = (low, middle) if _of_path(problem, middle) <= allowed else (middle, high)
     return int(float(f"{high * 1.04:.1e}"))
 

@@ -223,19 +223,19 @@ def _judge_between(
     """
     message = solution.message
     reference, time, arm = problem.reference, solution.trajectory.time, problem.task.arm
-    for error, own, allowed, unit, key, at in (
-        (off.distance, tracking, reference.tolerance, "m", "tolerance", off.at[0]),
-        (off.angle, turned, reference.orientation_tolerance, "rad", "orientation_tolerance", off.at[1]),
+    for error, own, allowed, unit, key, moment in (
+        (off.distance, tracking, reference.tolerance, "m", "tolerance", off.when[0]),
+        (off.angle, turned, reference.orientation_tolerance, "rad", "orientation_tolerance", off.when[1]),
     ):
         if error > allowed and not message:
             promise = (
                 "which promises its knots alone" if solution.knots_only else "within what it promises at its knots"
             )
-            message = f"{solution.method} is up to {error:.2g} {unit} off its path, {promise}"
+            message = f"up to {error:.2g} {unit} off its path, {promise}"
         if error > own.max() + allowed and not solution.knots_only:
             return Status.UNCONFIRMED, (
-                f"between its knots the motion is up to {error:.2g} {unit} off its path (at t = {at:.3g} s), more than "
-                f"path.{key} = {allowed:g} {unit}; {_advice(problem, time, error, allowed)}"
+                f"between its knots the motion is up to {error:.2g} {unit} off its path (at t = {moment:.3g} s), "
+                f"more than path.{key} = {allowed:g} {unit}; {_advice(problem, time, error, allowed)}"
             )
     turns = (
         turns_of_cycle(problem, solution.trajectory.q[:, arm.joints]) if problem.boundary is Boundary.CYCLIC else None

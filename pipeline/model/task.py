@@ -186,9 +186,7 @@ class PoseTask:
         return np.hstack([target_acceleration[:, :3], self._own(rotation, angular)])
 
     def apart(self, first: Array, second: Array) -> tuple[float, float]:
-        """How far two targets (6,) are from each other, [m] and [rad]: the angle of R0' R1, or that between the
-        axes.
-        """
+        """How far two targets (6,) are from each other, [m] and [rad]: the angle of R0' R1, or between the axes."""
         pair = np.array([first, second])
         rotation = Rotation.from_rotvec(pair[:1, 3:]).as_matrix()
         return float(np.linalg.norm(second[:3] - first[:3])), float(np.linalg.norm(self.turn(rotation, pair[1:])[0]))

@@ -16,9 +16,7 @@ CUSP = 0.02  # of the chords' speed: where a curve is slower than that it turns 
 
 
 class Spline:
-    """A cubic spline (C2) through `points` (P, m) [m], reparametrised by arc length; `first` is its number in
-    messages.
-    """
+    """A cubic spline (C2) through `points` (P, m) [m], by arc length; `first` is its number in messages."""
 
     def __init__(self, points: Array, first: int = 1) -> None:
         chord = np.linalg.norm(np.diff(points, axis=0), axis=1)

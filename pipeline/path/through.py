@@ -21,8 +21,7 @@ FINE = 33  # samples between two way-points
 
 @dataclass(frozen=True)
 class Through:
-    """A path through way-points: the curve, its orientations or None, and by way-point (P,) where along it that lies
-    [m].
+    """A path through way-points: the curve, its orientations or None, and where along it each way-point lies (P,) [m].
 
     stops: indices of way-points between the first and the last at which the path comes to rest.
     departure: the largest distance [m] of the curve from the way-points' polygon, and the way-point before it, from 1.

@@ -101,13 +101,11 @@ class WithStops:
 
 @dataclass(frozen=True)
 class Stamped:
-    """The fractions (P,) of the length at the times (P,) [s], from 0 on: rest to rest, and at rest in `stops`
-    (indices).
+    """The fractions (P,) of the length at times (P,) [s], from 0 on: rest to rest, and at rest in `stops` (indices).
 
-    Quintics with continuous acceleration, which is zero at the time stamps. The speed there is the harmonic mean of the
-    mean speeds before and after (Fritsch and Butland 1984), at most 5/4 of either: then the differences of Bezier
-    points, 5 d0, 5 d0, 25 v - 10 (d0 + d1), 5 d1, 5 d1 with mean speed v, are not negative, and no quintic runs
-    backwards.
+    Quintics with continuous acceleration, which is zero at the time stamps. The speed there is the harmonic mean of
+    the mean speeds before and after (Fritsch and Butland 1984), at most 5/4 of either: then the Bezier points of
+    the speed, d0, d0, 5 v - 2 (d0 + d1), d1, d1 with mean speed v, are not negative, and no quintic runs backwards.
     """
 
     times: tuple[float, ...]

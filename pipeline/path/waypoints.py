@@ -99,19 +99,18 @@ def _check_header(file: str | File, header: Sequence[str], axes: Sequence[str]) 
             only = ", ".join(name for name in kind if name in header)
             raise PathError(
                 f"path.file = {file}: an orientation needs the columns {', '.join(kind)}; the header has {only}, and "
-                "no "
-                f"{', '.join(lacking)}"
+                f"no {', '.join(lacking)}"
             )
     known = (*axes, *ROLL_PITCH_YAW, *QUATERNION, TIME)
     unknown = [name for name in header if name not in known]
     if unknown:
         close = difflib.get_close_matches(unknown[0].lower(), known, n=1, cutoff=0.75)
         hint = f"did you mean {close[0]}? " if close else ""
+        named = ", ".join(name or "(no name)" for name in unknown)
         raise PathError(
-            f"path.file = {file}: column{'s' * (len(unknown) > 1)} "
-            f"{', '.join(name or '(no name)' for name in unknown)} not "
-            f"understood; {hint}needed are {', '.join(axes)}; beside them there may be {', '.join(ROLL_PITCH_YAW)} or "
-            f"{', '.join(QUATERNION)}, and {TIME}"
+            f"path.file = {file}: column{'s' * (len(unknown) > 1)} {named} not understood; {hint}needed are "
+            f"{', '.join(axes)}; beside them there may be {', '.join(ROLL_PITCH_YAW)} or {', '.join(QUATERNION)}, and "
+            f"{TIME}"
         )
 
 

@@ -1,6 +1,4 @@
-"""What a command line asks for that has no effect: said in a line, or refused where nothing is left of what was
-asked.
-"""
+"""What a command line asks for without effect: said in a line, or refused where nothing is left of it."""
 
 from __future__ import annotations
 
@@ -14,15 +12,12 @@ WORD = r"\+{0,2}([a-z_]+)\.([a-z_.]+)=.*"  # key=value of a group
 
 
 def require_motion(config: RunConfig) -> None:
-    """Raise ConfigError where the motion that is to be exported, or followed by the controller, is of no method
-    that runs.
-    """
+    """Raise ConfigError where the motion to be exported, or followed by the controller, is of no method that runs."""
     method = config.export.method
     if method not in ("best", "none", *config.methods):
         raise ConfigError(
             f"export.method = {method}: that method does not run (methods = [{','.join(config.methods)}]), so that "
-            "there is "
-            "nothing to export"
+            "there is nothing to export"
         )
     if config.closed_loop.run and method == "none":
         raise ConfigError("closed_loop.run = true: it follows the exported motion, and export.method = none")

@@ -14,6 +14,7 @@ import numpy as np
 
 from pipeline.common.arrays import Array
 from pipeline.problem.problem import Boundary, Problem
+from pipeline.problem.turns import full_turns
 from pipeline.search.layers import Edges, closed_paths, through_every_node
 from pipeline.search.manifold import Manifold
 from pipeline.search.selection import diverse
@@ -48,8 +49,9 @@ class Roadmap:
         coarse = np.stack([layer[column] for layer, column in zip(nodes, paths.T, strict=True)], axis=1)
         turns = np.cumsum(manifold.wrap(np.diff(coarse, axis=1)), axis=1)
         coarse[:, 1:] = coarse[:, :1] + turns
-        if closed:  # as a motion, not only up to whole turns
-            back = np.abs(coarse[:, -1] - coarse[:, 0]).max(axis=1) < CLOSED
+        if closed:  # up to whole turns of those joints alone that nothing limits
+            gap = coarse[:, -1] - coarse[:, 0]
+            back = np.abs(gap - full_turns(problem, coarse[:, 0], coarse[:, -1])).max(axis=1) < CLOSED
             coarse, costs = coarse[back], costs[back]
         if not len(coarse):
             return none
@@ -132,5 +134,5 @@ def _on_grid(manifold: Manifold, times: Array, coarse: Array, grid: Array) -> Ar
     if manifold.problem.boundary is Boundary.FIXED:
         motions[:, 0] = manifold.problem.q_init
     if manifold.problem.boundary is Boundary.CYCLIC:
-        motions[:, -1] = motions[:, 0]
+        motions[:, -1] = motions[:, 0] + full_turns(manifold.problem, motions[:, 0], motions[:, -1])
     return motions[arrived.reshape(len(q), -1)[:, 1:].all(axis=1)]

@@ -71,9 +71,8 @@ class Nothing(Result):
 
     def section(self) -> list[str]:
         return [
-            "Exported: nothing, since no confirmed motion keeps every limit and its path, to path.tolerance between "
-            "its knots too "
-            "(export.method names one anyway)."
+            "Exported: nothing, since no confirmed motion keeps every limit and, to path.tolerance between its knots "
+            "too, its path (export.method names one anyway)."
         ]
 
 

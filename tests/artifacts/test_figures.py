@@ -91,6 +91,7 @@ def test_all_files_are_written_as_images(case: Case, tmp_path: Path) -> None:
         assert imread(file)[..., :3].std() > 0.05, f"{file.name} is blank"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [1, 8])
 def test_one_motion_and_many(case: Case, count: int) -> None:
     problem, motions = case

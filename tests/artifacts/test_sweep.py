@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 
 from tests.commands import call, command
+from tests.reports import leave_out_pictures
 
 pytestmark = pytest.mark.slow
 LSV = {"traj1": 8.81e-4, "traj2": 5.37e-3}
@@ -50,6 +51,7 @@ def test_a_sweep_leaves_one_table(tmp_path: Path) -> None:
 def test_a_bad_job_is_a_row_and_the_others_go_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
+    leave_out_pictures(monkeypatch)
     monkeypatch.chdir(tmp_path)
     words = ["-m", "+experiment=traj1", "methods=[lsv]", "path.length=-1,0.1,3.0", f"hydra.sweep.dir={tmp_path}/all"]
     answer = call(monkeypatch, capfd, *words)
@@ -82,6 +84,7 @@ def test_a_bad_job_is_a_row_and_the_others_go_on(
 def test_any_bad_input_of_a_job_is_a_row(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], words: list[str], reason: str
 ) -> None:
+    leave_out_pictures(monkeypatch)
     monkeypatch.chdir(tmp_path)
     swept = ["-m", "+experiment=traj1", f"hydra.sweep.dir={tmp_path}/all", "timing.steps=10"]
     swept += [] if words[0].startswith("methods") else ["methods=[lsv]"]
@@ -96,6 +99,7 @@ def test_any_bad_input_of_a_job_is_a_row(
 def test_a_job_that_fails_is_a_row_and_the_code_is_one(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
+    leave_out_pictures(monkeypatch)
     monkeypatch.chdir(tmp_path)
     drift = "method.lsv.max_drift=1e-12,0.01"
     answer = call(
@@ -110,6 +114,7 @@ def test_a_job_that_fails_is_a_row_and_the_code_is_one(
 def test_a_bad_word_stops_a_sweep_before_it_begins(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
+    leave_out_pictures(monkeypatch)
     monkeypatch.chdir(tmp_path)
     answer = call(monkeypatch, capfd, "-m", "+experiment=traj1,traj9", "methods=[lsv]")
     assert answer.code == 2

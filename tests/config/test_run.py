@@ -41,8 +41,9 @@ def composed(*overrides: str) -> DictConfig:
 
 @cache
 def checked(*overrides: str) -> schema.RunConfig:
-    with initialize_config_dir(str(CONF), version_base="1.3"):
-        return composing.checked(compose("config", overrides=list(overrides)))
+    """What Hydra itself is told is left out, as in a run."""
+    made = composed(*overrides)
+    return composing.checked(OmegaConf.masked_copy(made, [str(key) for key in made if key != "hydra"]))
 
 
 def text_of(experiment: str) -> str:

@@ -48,6 +48,7 @@ def solved(*overrides: str) -> tuple[Problem, Evaluation]:
 STARTS = {"fixed": (), "free": ("boundary=free",), "cyclic": CIRCLE}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("start", STARTS)
 def test_momentum_and_path_of_the_planner(start: str) -> None:
     e = solved(*ON_BASE, *STARTS[start])[1]
@@ -68,6 +69,7 @@ def test_momentum_and_path_of_the_planner(start: str) -> None:
     np.testing.assert_allclose(last.rotation[-1].as_matrix(), e.base.rotation[-1], atol=1e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["lsv", "inertia_weighted", "pmke"])
 def test_momentum_and_path_of_the_other_methods(method: str) -> None:
     config = composed(*ON_BASE, "method.pmke.prediction_step=0.4", "method.pmke.update_interval=0.4")
@@ -109,6 +111,7 @@ def test_a_base_that_was_moved_is_noticed() -> None:
     assert spoiled.base.floating.path_error == pytest.approx(honest.base.floating.path_error)
 
 
+@pytest.mark.slow
 def test_momentum_that_is_given_is_kept() -> None:
     problem, e = solved(*ON_BASE, "base.linear_momentum=[0.05,0,0]", "base.angular_momentum=[0,0,0.02]")
     assert e.status is Status.SOLVED
@@ -122,6 +125,7 @@ def test_momentum_that_is_given_is_kept() -> None:
     assert np.abs(moving).max() > 1e-3  # before the joints move, the base does
 
 
+@pytest.mark.slow
 def test_limits_are_kept_and_felt() -> None:
     free = solved(*ON_BASE, "boundary=free")[1]
     limits = ("limits=joint", "limits.velocity=1.0", "limits.torque=0.03", "limits.power=0.02", "limits.attitude=0.05")
@@ -133,6 +137,7 @@ def test_limits_are_kept_and_felt() -> None:
     assert e.energy_integral[-1] > free.energy_integral[-1]
 
 
+@pytest.mark.slow
 def test_a_bound_on_the_attitude() -> None:
     free = solved(*ON_BASE)[1]
     most = 0.6 * free.base.turn.max()
@@ -253,6 +258,7 @@ def test_reactions_are_the_rate_of_momentum(rng: np.random.Generator) -> None:
         np.testing.assert_allclose(e.base.reaction[i], (sides[0] - sides[1]) / (2 * h), atol=1e-7)
 
 
+@pytest.mark.slow
 def test_least_reaction_on_a_held_base() -> None:
     words = (*SHORT, "boundary=free", "objective=reaction", "objective.force=0.1")
     problem, e = solved(*words)

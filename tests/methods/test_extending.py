@@ -32,6 +32,7 @@ def solve(problem: Problem, options: NoOptions, context: Context) -> list[Soluti
 knotwise = Method("knotwise", "Knot by knot", "#8D5524", NoOptions, Serves(moving_base=False), solve)
 
 
+@pytest.mark.slow
 def test_a_new_method_runs_like_all_others(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(METHODS, "knotwise", knotwise)
     problem = prepare(composed("path.length=0.1", "timing.steps=20"))

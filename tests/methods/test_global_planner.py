@@ -180,6 +180,7 @@ def test_both_solvers_find_the_same_optima(name: str) -> None:
     assert all(min(abs(cost / other - 1) for other in ours) < 1e-5 for cost in near)
 
 
+@pytest.mark.slow
 def test_trajectory_4_has_a_better_motion_than_the_printed_one() -> None:
     """0.02301 J s where 0.0303 is printed: independent codes agree on the six lowest optima."""
     _, motions = solved("+experiment=traj4", NEWTON, "method.global.starts=roadmap", "method.global.coarse_steps=25")
@@ -187,6 +188,7 @@ def test_trajectory_4_has_a_better_motion_than_the_printed_one() -> None:
     np.testing.assert_allclose(energies, [0.02301, 0.02666, 0.02712, 0.02820, 0.03034, 0.03088], rtol=3e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["panda", "planar4r", "panda_pose", "xarm7"])
 def test_the_best_of_longer_searches_is_found(name: str) -> None:
     """r = 1 to 4, positions and poses; the numbers are those of brute-force searches by independent codes."""
@@ -199,6 +201,7 @@ def test_the_best_of_longer_searches_is_found(name: str) -> None:
 COARSE = ("+experiment=sim1", "timing.steps=12", *(f"method.global.{k}" for k in ("configurations=8", "candidates=80")))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("limit", "unit"), [("velocity=1.0", "rad/s"), ("torque=0.01", "N m"), ("power=0.001", "W")], ids=lambda word: word
 )

@@ -107,6 +107,7 @@ def test_a_bounded_integral_is_met_exactly(problem: Problem) -> None:
     assert evaluate(problem, solution).energy_integral[-1] == pytest.approx(bound, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_an_extreme_that_cannot_be_found_is_said(problem: Problem) -> None:
     tight = replace(problem, limits=replace(problem.bounds, velocity=np.full(3, 0.5)))
     (answer,) = pareto(tight, replace(OPTIONS, planner=replace(FEW, optimised=2, candidates=20)))

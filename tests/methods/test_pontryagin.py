@@ -54,7 +54,7 @@ def stated(case: str, boundary: str = "fixed", steps: int = 200, **other: object
 
 @cache
 def extremals(case: str, boundary: str) -> list[Solution]:
-    return pontryagin(stated(case, boundary), PontryaginOptions(guesses=6))
+    return pontryagin(stated(case, boundary), PontryaginOptions(guesses=3))
 
 
 @pytest.mark.parametrize(

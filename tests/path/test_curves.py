@@ -84,6 +84,7 @@ def planar_points() -> st.SearchStrategy[Array]:
     return st.lists(step, min_size=1, max_size=8).map(lambda steps: np.cumsum([(0.0, 0.0), *steps], axis=0))
 
 
+@pytest.mark.slow
 @given(planar_points())
 def test_spline_passes_through_its_points_at_the_right_arc_length(points: Array) -> None:
     spline = Spline(points)

@@ -87,6 +87,7 @@ def test_a_limit_just_wide_enough_is_not_violated(task: PositionTask, q_init: Ar
     np.testing.assert_allclose(task.value(found.q), problem.reference.position(problem.times), atol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fraction", [0.95, 0.5])
 def test_least_violation_of_velocity_limits_is_the_true_one(
     task: PositionTask, q_init: Array, rng: np.random.Generator, fraction: float

@@ -1,4 +1,6 @@
-"""Whatever is typed or stands in a file: exit code 0, 1 or 2, one line, no traceback, nothing half-written."""
+"""Whatever is typed, or stands in a file: exit code 0, 1 or 2, at most one line on stderr, no traceback, nothing
+half-written.
+"""
 
 from __future__ import annotations
 
@@ -52,6 +54,8 @@ VALUES = st.one_of(
             "'",
             '"a',
             "${x}",
+        ]
+        + [
             "${oc.env:HOME}",
             "${name}",
             "{a:1}",

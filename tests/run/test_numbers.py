@@ -54,6 +54,7 @@ def test_least_spectral_radius_on_trajectory_4() -> None:
     assert motion.time[least] == pytest.approx(5.71, abs=0.02)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("number", "energy"), [(1, 5.98e-4), (2, 4.08e-3), (3, 7.57e-3), (4, 3.97e-2)])
 def test_pmke_is_at_most_one_percent_above_the_paper(number: int, energy: float) -> None:
     (motion,) = solved(number, "pmke")[1]

@@ -62,6 +62,7 @@ def table(folder: Path) -> pd.DataFrame:
     return pd.read_csv(folder / "all" / "sweep.csv")
 
 
+@pytest.mark.slow
 def test_what_is_finished_is_skipped_and_stays_in_the_table(again: Sweep, tmp_path: Path) -> None:
     made = (tmp_path / "all" / "sweep.csv").read_bytes()
     answer = again("path.length=0.1,0.15", "parallel.workers=2")  # how it is computed changes no result
@@ -73,6 +74,7 @@ def test_what_is_finished_is_skipped_and_stays_in_the_table(again: Sweep, tmp_pa
     assert skipped(again("path.length=0.1", "sweep.resume=false")) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("change", ["value", "version", "record", "objective"])
 def test_what_would_be_another_run_is_run_again(
     change: str, again: Sweep, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -90,6 +92,7 @@ def test_what_would_be_another_run_is_run_again(
     assert len(skipped(again(*words))) == len(table(tmp_path))
 
 
+@pytest.mark.slow
 def test_another_content_of_a_file_is_another_run(sweep: Sweep, tmp_path: Path) -> None:
     words = ["path=waypoints", "path.file=points.csv", "path.relative=true"]
     for middle in (0.05, 0.04):
@@ -98,6 +101,7 @@ def test_another_content_of_a_file_is_another_run(sweep: Sweep, tmp_path: Path) 
     assert skipped(sweep(*words)) == ["0_traj1"]
 
 
+@pytest.mark.slow
 def test_a_run_that_fails_takes_the_finished_one_out_of_its_folder(again: Sweep, tmp_path: Path) -> None:
     assert again("path.length=0.1,3.0").code == 2
     assert list(table(tmp_path)["status"]) == ["solved", "bad input"]
@@ -105,6 +109,7 @@ def test_a_run_that_fails_takes_the_finished_one_out_of_its_folder(again: Sweep,
     assert list(table(tmp_path)["status"]) == ["solved", "solved"]
 
 
+@pytest.mark.slow
 def test_a_run_that_is_finished_but_not_confirmed_is_not_made_better_by_skipping(sweep: Sweep) -> None:
     words = ["path.length=0.1", "method.lsv.max_drift=1e-12"]
     assert sweep(*words).code == 1
@@ -117,6 +122,7 @@ def test_runs_of_an_earlier_sweep_are_not_in_the_table(again: Sweep, tmp_path: P
     assert list(table(tmp_path)["run"]) == ["0_traj1"]
 
 
+@pytest.mark.slow
 def test_a_run_that_crashes_is_a_row_and_the_others_go_on(
     sweep: Sweep, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -32,6 +32,7 @@ def prepared(monkeypatch: pytest.MonkeyPatch) -> list[RunConfig]:
     return asked
 
 
+@pytest.mark.slow
 def test_a_run_prepares_its_problem_once(
     prepared: list[RunConfig], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:

@@ -43,6 +43,7 @@ def points(tmp_path: Path) -> Callable[[Any], Path]:
 ROWS = np.array([[0.45, 0.02], [0.40, 0.06], [0.36, 0.05], [0.33, 0.10]])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("relative", [False, True])
 def test_way_points(points: Callable[[Any], Path], relative: bool) -> None:
     config = composed(
@@ -77,6 +78,7 @@ def test_a_path_can_say_where_it_starts() -> None:
     assert evaluate(problem, lsv(problem)[0]).status is Status.SOLVED
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", ["constant_speed", "quintic", "raised_cosine"])
 def test_timing_laws_run(law: str) -> None:
     problem = prepared("+experiment=traj1", f"timing={law}", "timing.duration=10.0", "timing.steps=26")

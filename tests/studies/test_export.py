@@ -133,6 +133,7 @@ def sent_by(problem: Problem, settings: RunConfig, *motions: Evaluation) -> Resu
     return study(Motions(settings, problem, motions))
 
 
+@pytest.mark.slow
 def test_the_best_motion_is_the_cheapest_that_hits_nothing() -> None:
     """A method that promises no clearance goes through the ball: cheaper, and not to be sent."""
     ball = Shape("ball", "sphere", (0.04,), (0.69, 0.49, 0.0))

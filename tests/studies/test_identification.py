@@ -84,6 +84,7 @@ def test_other_masses_leave_mounting_and_base(as_printed: Arm, rng: np.random.Ge
         np.testing.assert_allclose(changed.inverse_dynamics(q, qd, qdd), tau, atol=1e-10)
 
 
+@pytest.mark.slow
 def test_numbers_are_those_of_the_evaluation() -> None:
     problem = prepare(composed("+experiment=traj4"))
     solution = lsv(problem)[0]

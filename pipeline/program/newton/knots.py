@@ -1,6 +1,7 @@
 """Which knots of a motion are unknown, and how what belongs to intervals is spread over them.
 
-    fixed: q_1 .. q_N,    free: q_0 .. q_N,    cyclic: q_0 .. q_(N-1), and q_N is q_0: its matrices are folded.
+    fixed: q_1 .. q_N,    free: q_0 .. q_N,    cyclic: q_0 .. q_(N-1), and q_N is q_0, up to the full
+    turns by which a start winds: its matrices are folded.
 
 Each unknown knot owns the interval that ends at it: in a cycle q_0 owns the last one, with a free start it owns none.
 Arrays have the starts first: motions (S, N + 1, n), unknowns and owned intervals (S, U, ...).
@@ -32,15 +33,22 @@ class Knots:
         """x (S, U, n) of motions (S, N + 1, n)."""
         return motions[:, self.first : self.first + self.count].copy()
 
+    def begin(self, motions: Array) -> Array:
+        """What the unknowns leave open (S, 1, n) [rad]: the first knot, or the full turns by which a cycle winds."""
+        if not self.cyclic:
+            return motions[:, :1].copy()
+        turns: Array = 2 * np.pi * np.rint((motions[:, -1:] - motions[:, :1]) / (2 * np.pi))
+        return turns
+
     def whole(self, x: Array, begin: Array) -> Array:
-        """Motions (S, N + 1, n) of the unknowns, from `begin` (S, 1, n) where the start is fixed."""
+        """Motions (S, N + 1, n) of the unknowns, with what they leave open."""
         if self.fixed:
             return np.concatenate([begin, x], axis=1)
-        return np.concatenate([x, x[:, :1]], axis=1) if self.cyclic else x
+        return np.concatenate([x, x[:, :1] + begin], axis=1) if self.cyclic else x
 
     def steps(self, x: Array, begin: Array) -> Array:
         """The displacement (S, U, n) over the interval that each knot owns."""
-        first = begin if self.fixed else x[:, -1:] if self.cyclic else x[:, :1]
+        first = begin if self.fixed else x[:, -1:] - begin if self.cyclic else x[:, :1]
         return x - np.concatenate([first, x[:, :-1]], axis=1)
 
     def spread(self, at_end: Array, at_begin: Array) -> Array:

@@ -152,7 +152,7 @@ class Newton:
         return answer
 
     def _begin(self, q: Array, barrier: Barrier) -> State:
-        count, begin, x = len(q), q[:, :1].copy(), self.knots.unknown(q)
+        count, begin, x = len(q), self.knots.begin(q), self.knots.unknown(q)
         kept, mu = self.bounds.values(x, begin), np.full(count, barrier.mu if self.bounds else 0.0)
         slack = np.maximum(kept, barrier.push * self.bounds.width)
         z = np.minimum(mu[:, None] / slack, PENALTY / 2)

@@ -23,9 +23,7 @@ def link(program: Program) -> None:
 
 
 def bound(program: Program) -> None:
-    """q(0) given, or q(T) = q(0) up to the full turns of the guess; a base starts where it is, a held one stays
-    there.
-    """
+    """q(0) given, or q(T) = q(0) up to the full turns of the guess; a base starts where it is, a held one stays."""
     start, nb = POSITION_SCALE * program.problem.q_init, program.nb
     if program.problem.boundary is Boundary.FIXED:
         program.drake.AddBoundingBoxConstraint(start, start, program.y[0])

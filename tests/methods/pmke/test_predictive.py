@@ -93,6 +93,7 @@ def test_a_window_longer_than_the_motion_is_cut(problem: Make, options: PmkeOpti
     assert np.isfinite(solution.trajectory.q).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("update", [0.1, 0.04])
 def test_a_prediction_at_every_step(problem: Make, update: float) -> None:
     """Update interval equal to dt, or below it: a prediction at every step while a window of 2 s is left."""
