@@ -1,10 +1,4 @@
-<<<<<<< HEAD
 """A run that is ended from outside leaves nobody behind and nothing half-written, and a new start ends the same."""
-=======
-"""A run that is ended from outside: nobody is left behind, nothing half-written stays, and a new start ends the
-same.
-"""
->>>>>>> main
 
 from __future__ import annotations
 
