@@ -54,8 +54,6 @@ VALUES = st.one_of(
             "'",
             '"a',
             "${x}",
-        ]
-        + [
             "${oc.env:HOME}",
             "${name}",
             "{a:1}",
