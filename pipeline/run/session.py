@@ -110,7 +110,9 @@ def _refuse_jobs(config: DictConfig) -> None:
     """Raise ConfigError for runs of a sweep that would share a folder, and for a `name` that cannot be a folder's."""
     from pipeline.config.fields import as_name
 
-    words = OverridesParser.create().parse_overrides(list(config.hydra.overrides.task))
+    # Unresolved: an interpolation that fails is the fault of its job alone.
+    asked = OmegaConf.to_container(config.hydra.overrides.task, resolve=False)
+    words = OverridesParser.create().parse_overrides([str(word) for word in asked or ()])
     template = str(OmegaConf.to_container(config.hydra.sweep, resolve=False)["subdir"])  # type: ignore[index,call-overload]
     if "${" not in template and any(word.is_sweep_override() for word in words):
         raise ConfigError(f"hydra.sweep.subdir = {template}: {SHARED}")

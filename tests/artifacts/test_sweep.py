@@ -63,7 +63,7 @@ def test_a_bad_job_is_a_row_and_the_others_go_on(
     table = words_of(tmp_path / "all" / "sweep.csv")
     assert list(table["run"]) == ["0_traj1", "1_traj1", "2_traj1"]
     assert list(table["status"]) == ["bad input", "solved", "bad input"]
-    assert "must be a number > 0 m" in table["message"][0]
+    assert "must be a number >= 0 m" in table["message"][0]
     assert "out of reach from" in table["message"][2]
     assert table["kinetic_energy_integral"][1] == pytest.approx(8.81e-4, rel=5e-3)
     head, _, *rows = rows_of(tmp_path / "all" / "sweep.md")

@@ -190,7 +190,7 @@ def test_workers_of_other_versions_are_refused(
     two_workers: Cluster, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(cluster, "stamp", lambda: "selfmotion 99")
-    with pytest.raises(ConfigError, match=r"other versions \(selfmotion .*selfmotion 99"):
+    with pytest.raises(ConfigError, match=r"other versions \(source \w+, selfmotion .*selfmotion 99"):
         Workers(address=two_workers.address).map(work, tmp_path, [2.0])
 
 

@@ -132,11 +132,13 @@ def test_an_unfinished_file_is_no_result(tmp_path: Path) -> None:
     assert len(calls(tmp_path)) == 2
 
 
+# Solves that are spread over workers: those of IPOPT, from the paper's starts.
+ALONE = {"starts": "population", "solver": "ipopt", "coarse_steps": 12}
 SIM1 = {
     "boundary": {"kind": "free"},
     "path": {"kind": "line", "length": 0.4},
     "timing": {"duration": 1.0, "steps": 26},
-    "method": {"global": {"configurations": 6, "candidates": 60, "optimised": 6}},
+    "method": {"global": {"configurations": 6, "candidates": 60, "optimised": 6, **ALONE}},
 }
 
 
@@ -190,7 +192,7 @@ def test_a_killed_run_goes_on(
     assert not (killed / UNFINISHED).exists()
     assert {file.name for file in killed.iterdir()} == RUN_FILES
     # The same as without the interruption.
-    options = {"configurations": 8, "candidates": 100, "optimised": 10}
+    options = {"configurations": 8, "candidates": 100, "optimised": 10, **ALONE}
     undisturbed = config.check({**SIM1, "method": {"global": options}})
     whole = global_planner(prepare(undisturbed), undisturbed.method.global_)
     motions = pd.read_parquet(killed / "trajectories.parquet").groupby("optimum")

@@ -28,7 +28,8 @@ from tests.support import composed
 
 FEW = tuple(f"method.global.{key}" for key in ("configurations=8", "candidates=100", "optimised=2"))
 SHORT = ("timing.duration=4", "timing.steps=30", *FEW)
-ON_BASE = ("robot=planar3r_base", "base=free", *SHORT)
+BETWEEN = "path.tolerance=1e-3"  # the grids are coarse
+ON_BASE = ("robot=planar3r_base", "base=free", BETWEEN, *SHORT)
 CIRCLE = ("path=circle", "path.radius=0.05", "boundary=cyclic")
 
 
@@ -181,6 +182,7 @@ def test_cycles_in_space(orientation: str) -> None:
         *around,
         "timing.duration=4",
         "timing.steps=24",
+        BETWEEN,
         "method.global.candidates=40",
         "method.global.optimised=2",
     )[1]

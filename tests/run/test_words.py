@@ -47,7 +47,11 @@ ROWS = np.array([[0.45, 0.02], [0.40, 0.06], [0.36, 0.05], [0.33, 0.10]])
 @pytest.mark.parametrize("relative", [False, True])
 def test_way_points(points: Callable[[Any], Path], relative: bool) -> None:
     config = composed(
-        "path=waypoints", f"path.file={points(ROWS)}", f"path.relative={str(relative).lower()}", "timing.steps=26"
+        "path=waypoints",
+        f"path.file={points(ROWS)}",
+        f"path.relative={str(relative).lower()}",
+        "timing.steps=26",
+        "path.tolerance=2e-3",
     )
     problem = prepare(config)
     here = prepared().task.value(np.array([config.robot.q_init]))[0]
