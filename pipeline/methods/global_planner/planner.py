@@ -1,8 +1,8 @@
 """The interpolation-based Global Kinematic Planner (Global paper Section 3): many coarse starts, every optimum refined.
 
-Initial configurations and a population of motions are drawn and ranked (`search/population.py`), the best diverse ones
-are optimised on a coarse grid, and each distinct optimum is carried to the wanted knots by cubic splines, halving the
-step.
+Motions come from a roadmap over the self-motion manifolds (`search/roadmap.py`), or from a ranked population as in the
+paper (`search/population.py`). They are optimised on a coarse grid, and each distinct optimum is carried to the wanted
+knots by cubic splines, halving the step. What is listed are the optima found from so many starts, not all there are.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ HOPELESS = 0.1  # relative violation on a coarse grid from which on finer ones a
 
 
 def solve(problem: Problem, options: GlobalOptions, context: Context) -> list[Solution]:
-    """All distinct optima found, best first."""
+    """The distinct optima found from these starts, best first."""
     why = Batch.without(problem, options)
     grids = refinement(problem.times, options.coarse_steps or (STEPS if why is None else STEPS_ALONE))
     motions, log = _starts(problem, grids[0], options, np.random.default_rng(context.seed))
