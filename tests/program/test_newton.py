@@ -143,7 +143,7 @@ def solved(*words: str) -> tuple[Problem, Newton, Array]:
     return (
         problem,
         Solver(problem).on(problem.times),
-        Roadmap().starts(problem, problem.times, np.random.default_rng(1)),
+        Roadmap(problem, problem.times, np.random.default_rng(1)).cheapest(64),
     )
 
 

@@ -13,7 +13,7 @@ from scipy.interpolate import CubicSpline
 from pipeline.common.arrays import Array
 from pipeline.config.methods import GlobalOptions
 from pipeline.methods.global_planner.optimum import (
-    STAYS,
+    STRAYED,
     Optimum,
     first_order,
     keeps_torque_limits,
@@ -27,7 +27,7 @@ from pipeline.program.newton.newton import COLD, WARM, Barrier, Newton
 from pipeline.program.newton.serve import Solver, why_not
 
 ON_PATH = 1e-8  # [m, rad] at every knot
-JUMPS = 0.1  # of the path's length: an optimum that leaves it so far between coarse knots is not refined
+SMOOTH = 0.003  # of the path's length: an optimum that leaves it farther and is lost on a finer grid has jumped
 
 
 class Batch:
@@ -36,6 +36,11 @@ class Batch:
     def __init__(self, problem: Problem, options: GlobalOptions) -> None:
         self.problem, self.options, self.first = problem, options, first_order(problem)
         self.solver = Solver(self.first)
+
+    @property
+    def whole(self) -> bool:
+        """Whether Newton's method serves the problem itself, not only its terms of first order."""
+        return self.first is self.problem
 
     @staticmethod
     def without(problem: Problem, options: GlobalOptions) -> str | None:
@@ -49,9 +54,7 @@ class Batch:
     def refine(self, grids: list[Array], basins: list[Optimum]) -> list[Optimum | None]:
         """The first grid's optima on the last, as IPOPT leaves them; None: lost, or torque limits matter."""
         on = grids[0]
-        refined: list[Optimum | None] = [
-            self._whether_continuous(on, optimum, JUMPS) if self._keeps(on, optimum) else None for optimum in basins
-        ]
+        refined: list[Optimum | None] = [optimum if self._keeps(on, optimum) else None for optimum in basins]
         for fine in grids[1:]:
             newton = self.solver.on(fine)
             going = [(k, optimum) for k, optimum in enumerate(refined) if optimum is not None and optimum.continuous]
@@ -64,18 +67,22 @@ class Batch:
                 found[k] = replace(again, solves=found[k].solves + again.solves)
             for (k, before), finer in zip(going, found, strict=True):
                 refined[k] = replace(finer, solves=before.solves + finer.solves) if self._keeps(fine, finer) else None
+                if refined[k] is None and not stays_on_path(self.problem, on, before.q, SMOOTH):
+                    refined[k] = replace(before, continuous=False)
+                elif finer.cost > STRAYED * before.cost:
+                    refined[k] = replace(finer, continuous=False)
             on = fine
         return [optimum and self._finish(on, optimum) for optimum in refined]
 
     def _keeps(self, times: Array, optimum: Optimum) -> bool:
         return optimum.converged and keeps_torque_limits(self.problem, times, optimum.q)
 
-    def _whether_continuous(self, times: Array, optimum: Optimum, share: float) -> Optimum:
-        return replace(optimum, continuous=stays_on_path(self.problem, times, optimum.q, share))
+    def _whether_continuous(self, times: Array, optimum: Optimum) -> Optimum:
+        return replace(optimum, continuous=stays_on_path(self.problem, times, optimum.q))
 
     def _finish(self, times: Array, optimum: Optimum) -> Optimum | None:
         """IPOPT's last word on an optimum; one that jumps between its knots is not worth it."""
-        optimum = self._whether_continuous(times, optimum, STAYS) if optimum.continuous else optimum
+        optimum = self._whether_continuous(times, optimum) if optimum.continuous else optimum
         if not optimum.continuous:
             return optimum
         options = self.options
@@ -88,7 +95,7 @@ class Batch:
             return replace(optimum, q=told.q, cost=cost, status=told.status, solves=solves)
         final = optimise(self.first, times, optimum.q, options)
         final = replace(final, solves=[*optimum.solves, {**entry, "cost": optimum.cost}, *final.solves])
-        return self._whether_continuous(times, final, STAYS) if self._keeps(times, final) else None
+        return self._whether_continuous(times, final) if self._keeps(times, final) else None
 
 
 def _solve(newton: Newton, guesses: Array, barrier: Barrier) -> list[Optimum]:
