@@ -24,7 +24,7 @@ SLACK = 1.15  # times the velocity limits: a coarse step's mean may be a little 
 PRICED = 3  # times as many starts are priced on the first grid as are kept
 APART = 0.1  # [rad]: starts are not closer than half of this
 CLOSED = 1e-6  # [rad]
-FEW = 4  # nodes of a layer that a random motion may choose from: with 8 the cheap ones prevail
+FEW = 4  # nodes of a layer, at most, that a random motion may choose from: with 8 the cheap ones prevail
 
 
 class Roadmap:
@@ -68,11 +68,12 @@ class Roadmap:
         for _ in range(count):
             if not self.edges or sum(map(len, found)) >= count:
                 break
-            few = [np.sort(self.rng.choice(len(layer), min(FEW, len(layer)), replace=False)) for layer in self.nodes]
+            size = int(self.rng.integers(2, FEW + 1))
+            few = [np.sort(self.rng.choice(len(layer), min(size, len(layer)), replace=False)) for layer in self.nodes]
             if self.closed:
                 few[-1] = few[0]
             paths, _ = self._paths([edge[np.ix_(*ends)] for edge, *ends in zip(self.edges, few, few[1:], strict=False)])
-            some = paths[self.rng.permutation(len(paths))[:FEW]]
+            some = paths[self.rng.permutation(len(paths))[:size]]
             found.append(np.stack([nodes[column] for nodes, column in zip(few, some.T, strict=True)], axis=1))
         if not found:
             return self._none
