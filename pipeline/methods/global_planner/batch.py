@@ -89,6 +89,7 @@ class Batch:
         told = confirm(self.first, times, optimum.q, tolerance=options.tolerance, max_iterations=options.max_iterations)
         entry = {"solver": "ipopt", "intervals": len(times) - 1, "iterations": told.iterations, "moved": told.moved}
         entry |= {"wall_time_s": told.wall_time, "status": told.status}
+        entry |= {"violation": told.violation, "optimality": told.optimality}
         if told.converged:
             cost = float(objective_values(self.problem, times, told.q[None])[0])
             solves = [*optimum.solves, {**entry, "cost": cost}]

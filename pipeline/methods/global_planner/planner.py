@@ -96,6 +96,8 @@ def solve(problem: Problem, options: GlobalOptions, context: Context) -> list[So
         return [_nothing(problem, Status.NOT_CONVERGED, no_optimum(problem, grids[0], starts, refined), log)]
     members = {id(fine): count for fine, count in found}
     ranked = basins(problem, problem.times, [fine for fine, _ in found], options.same_path).optima
+    count = f"{len(ranked)} distinct optim{'um' if len(ranked) == 1 else 'a'} found from {len(starts)} starts"
+    words = f"{count}; the last {coarse.barren} starts brought nothing new; "
     solutions = []
     for rank, fine in enumerate(ranked):
         own = {"starts_in_basin": members[id(fine)], "solves": fine.solves}
@@ -107,6 +109,7 @@ def solve(problem: Problem, options: GlobalOptions, context: Context) -> list[So
                 optimum=rank + 1,
                 tracking_tolerance=TRACKING,
                 limits_kept=LIMIT_KINDS,
+                evidence=(words if rank == 0 else "") + fine.evidence,
                 statistics={**(log if rank == 0 else {}), **own},
             )
         )

@@ -37,7 +37,8 @@ class Window:
         self.program = MathematicalProgram()
         w = self.program.NewContinuousVariables(horizon * self.n, "w")
         self._rows = DifferentiableConstraint(self._tracking)
-        self.program.AddCost(DifferentiableCost(self._energy), vars=w)
+        self._cost = DifferentiableCost(self._energy)
+        self.program.AddCost(self._cost, vars=w)
         self.program.AddConstraint(self._rows, lb=np.zeros(horizon * task.m), ub=np.zeros(horizon * task.m), vars=w)
 
     def solve(
@@ -45,6 +46,7 @@ class Window:
     ) -> tuple[Array, float, ipopt.Outcome, int]:
         """From q_start (n,) through x_ref (h, m), started at guess (h, n): q (h, n), objective, outcome, iterations."""
         self._rows.forget()
+        self._cost.forget()
         velocity = np.diff(np.vstack([q_start, guess]), axis=0) / self.dt
         metric = self.lagrangian.metric(guess)
         energy = 0.5 * self.dt * float(np.einsum("ki,kij,kj->", velocity, metric, velocity))
