@@ -16,10 +16,8 @@ from pipeline.evaluation.sums import weighted_sum
 from pipeline.problem.problem import Boundary, Problem
 from pipeline.problem.solution import Trajectory
 
-CLEARANCES = 5  # of those at which distances from obstacles are taken
-
-
 BETWEEN = 10  # sub-intervals per knot interval on which the motion between knots is judged
+CLEARANCES = 5  # of those at which distances from obstacles are taken
 
 
 def between_knots(
@@ -40,14 +38,13 @@ def between_knots(
     dt = np.diff(trajectory.time)
     moments = (trajectory.time[:-1, None] + dt[:, None] * fraction).ravel()
     q, qd, qdd = spline(moments), spline(moments, 1), spline(moments, 2)
-    energy, secondary, turn = np.zeros((3, len(moments)))
-    tau, nb = np.zeros_like(q), plant.nb
-    spinning = np.zeros(len(moments))
+    energy, secondary, spinning = np.zeros((3, len(moments)))
+    tau, nb, way = np.zeros_like(q), plant.nb, np.tile(plant.start, (len(moments), 1, 1))
     for i in range(len(moments)):
         plant.at(q[i], qd[i])
         energy[i] = plant.kinetic_energy()
-        turn[i] = angle_between(plant.start, plant.base()[1][None])[0]
-        spinning[i] = plant.spin_squared()
+        if nb:
+            way[i], spinning[i] = plant.base()[1], plant.spin_squared()
         if problem.bounds.any:
             tau[i] = plant.torque(qdd[i])
         if problem.objective.secondary:
@@ -57,7 +54,7 @@ def between_knots(
     first_order = {"kinetic_energy": integral, "velocity_norm": norm, "base_rotation": spun}
     objective = weighted_sum(problem, first_order, gain)
     clear = float(clearance(q[:: BETWEEN // CLEARANCES]).min())
-    excess = limit_excess(problem, q, qd, tau, clear, float(turn.max()))
+    excess = limit_excess(problem, q, qd, tau, clear, float(angle_between(plant.start, way).max()))
     return integral, objective, clear, excess
 
 
@@ -74,12 +71,12 @@ class Audit:
 def audit(problem: Problem, time: Array, q: Array, qd: Array, qdd: Array) -> Audit:
     """Judge samples (K, n) that come with their own velocities and accelerations, at times (K,)."""
     plant, targets = SinglePlant(problem.task.arm), problem.reference.position(time)
-    error, turned, turn, tau = np.empty(len(time)), np.empty(len(time)), np.empty(len(time)), np.empty_like(q)
+    error, turned, way, tau = np.empty(len(time)), np.empty(len(time)), np.empty((len(time), 3, 3)), np.empty_like(q)
     for i in range(len(time)):
         plant.at(q[i], qd[i])
         error[i], turned[i] = plant.task_error(problem.task, targets[i])
-        tau[i] = plant.torque(qdd[i])
-        turn[i] = angle_between(plant.start, plant.base()[1][None])[0]
+        tau[i], way[i] = plant.torque(qdd[i]), plant.base()[1]
+    turn = angle_between(plant.start, way)
     clearance = Clearance(problem.task.arm, problem.obstacles)(q)
     worst = {
         kind: tuple(int(place) for place in np.unravel_index(int(np.argmax(excess)), excess.shape))

@@ -121,19 +121,24 @@ def evaluate(problem: Problem, solution: Solution) -> Evaluation:
     if arm.base.kind == "floating" and problem.boundary is Boundary.CYCLIC:
         qd, qdd = entered_cycle(plant, trajectory, qd)
     count, n = q.shape
-    tau, energy, radius = np.full((count, n), np.nan), np.full(count, np.nan), np.full(count, np.nan)
-    skeleton, singular = np.full((count, n - arm.base.count + 1, 3), np.nan), np.full(count, np.nan)
+    tau, energy = np.full((count, n), np.nan), np.full(count, np.nan)
+    skeleton, radius, singular = np.full((count, n - arm.base.count + 1, 3), np.nan), *np.full((2, count), np.nan)
     place, way = np.full((count, 3), np.nan), np.full((count, 3, 3), np.nan)
     tracking, turned, targets = np.full(count, np.nan), np.full(count, np.nan), problem.reference.position(time)
-    for i in np.flatnonzero(np.isfinite(np.hstack([q, qd, qdd])).all(axis=1)):  # Drake refuses other values
+    finite = np.flatnonzero(np.isfinite(np.hstack([q, qd, qdd])).all(axis=1))  # Drake refuses other values
+    inertia, jacobian = [], []
+    for i in finite:
         plant.at(q[i], qd[i])
         energy[i] = plant.kinetic_energy()
         tau[i] = plant.torque(qdd[i])
         spread = plant.motion_map()
-        radius[i] = np.linalg.eigvalsh(spread.T @ plant.mass_matrix() @ spread)[-1]
+        inertia.append(spread.T @ plant.mass_matrix() @ spread)
+        jacobian.append(plant.task_jacobian(task) @ spread)
         skeleton[i], (place[i], way[i]) = plant.skeleton(), plant.base()
-        singular[i] = np.linalg.svd(plant.task_jacobian(task) @ spread, compute_uv=False)[-1]
         tracking[i], turned[i] = plant.task_error(task, targets[i])
+    if len(finite):
+        radius[finite] = np.linalg.eigvalsh(inertia)[:, -1]
+        singular[finite] = np.linalg.svd(jacobian, compute_uv=False)[:, -1]
     # At the first knot nothing has been spent yet: the interval's values stand at its end.
     tau[0] = tau[0] if problem.boundary is Boundary.CYCLIC else 0.0
     position = skeleton[:, -1]
