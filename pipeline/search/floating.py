@@ -20,6 +20,7 @@ from pipeline.problem.turns import full_turns
 from pipeline.search.manifold import Manifold
 
 WAY = 4  # steps of the straight way to a configuration that is drawn
+ROUNDS = 3
 SHARE = 0.1  # of the energy in the metric of an objective to which not all velocities count
 
 
@@ -70,28 +71,30 @@ class OnMovingBase(Manifold):
     def first(self, target: Array, count: int, rng: np.random.Generator) -> Array:
         """Before the motion begins the base stands where it stands."""
         problem, task, bounds, joints = self.problem, self.problem.task, self.problem.bounds, self.joints
-        own = (bounds.lower, bounds.upper, bounds.velocity, bounds.torque, bounds.power)
+        free = Limits.none(self.n - self.base.count)
         standing = replace(
             problem,
             task=replace(task, arm=task.arm.on_fixed_base),
             q_init=problem.q_init[joints],
-            limits=Limits(*(bound[joints] for bound in own)),
+            limits=replace(free, lower=bounds.lower[joints], upper=bounds.upper[joints]),
             qd_init=None,
         )
         q = Manifold(standing).draw(target, count, rng)
         return np.hstack([np.tile(problem.q_init[: self.base.count], (len(q), 1)), q])
 
     def along(self, grid: Array, wished: Array) -> tuple[Array, Array]:
-        """Knot by knot: as `wished` for the joints, the base with them, and then onto the path."""
-        targets, q, good = self.problem.reference.position(grid), wished[:, 0], np.ones(len(wished), bool)
-        motions = [q]
-        for knot in range(1, len(grid)):
-            move = wished[:, knot, self.joints] - q[:, self.joints]
-            q = self.wait(self.moved(q, move), grid[knot] - grid[knot - 1])
-            q, arrived = self.project(q, np.tile(targets[knot], (len(q), 1)), steps=12, tolerance=1e-7)
+        """Knot by knot: as `wished` for the joints, the base with them, and then onto the path; in `ROUNDS`, since the
+        base follows the whole of a step and not its parts.
+        """
+        targets, good = self.problem.reference.position(grid), np.ones(len(wished), bool)
+        walked = wished.copy()
+        for knot, dt in enumerate(np.diff(grid), 1):
+            before, q, target = walked[:, knot - 1], walked[:, knot], np.tile(targets[knot], (len(wished), 1))
+            for _ in range(ROUNDS):
+                q = self.wait(self.moved(before, q[:, self.joints] - before[:, self.joints]), dt)
+                q, arrived = self.project(q, target, steps=12, tolerance=1e-7)
             good &= arrived
-            motions.append(q)
-        walked = np.stack(motions, axis=1)
+            walked[:, knot] = q
         return (self._closed(grid, walked) if self.problem.boundary is Boundary.CYCLIC else walked), good
 
     def _closed(self, grid: Array, motions: Array) -> Array:

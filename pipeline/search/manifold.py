@@ -117,7 +117,7 @@ class Manifold:
             motions[:, 0] = self.problem.q_init
         if self.problem.boundary is Boundary.CYCLIC:
             motions[:, -1] = motions[:, 0] + full_turns(self.problem, motions[:, 0], motions[:, -1])
-        return motions, arrived.reshape(count, -1)[:, 1:].all(axis=1)
+        return motions, np.asarray(arrived.reshape(count, -1)[:, 1:].all(axis=1))
 
     def draw(self, target: Array, count: int, rng: np.random.Generator) -> Array:
         """At most `count` allowed configurations (K, n) at one target (m,): uniform joint angles, projected."""
