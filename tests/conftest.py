@@ -163,11 +163,14 @@ def reproduce_in(folder: Path) -> None:
     from tests.reports import leave_out_pictures
 
     few = (
-        *(f"method.global.{key}" for key in ("configurations=12", "candidates=150", "optimised=12")),
+        *(f"method.global.{key}" for key in ("configurations=12", "candidates=150", "optimised=12", "solver=newton")),
         "identification.documents=[global]",
     )
     # Its law is one of large numbers.
-    many = ("method.global.candidates=300", "method.global.optimised=16", "candidate_study.repeats=4")
+    many = (
+        *(f"method.global.{key}" for key in ("candidates=300", "optimised=16", "solver=newton")),
+        "candidate_study.repeats=4",
+    )
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("HYDRA_FULL_ERROR", "0")  # the command line sets it; this puts it back
         patch.setattr(session, "exit_code", 0)
