@@ -138,9 +138,6 @@ def _starts(
     log: dict[str, Any] = {}
     revolute = problem.task.arm.description.revolute
     wanted = STARTS[options.starts]
-    if "roadmap" in wanted and problem.task.arm.base.count:
-        wanted = ("population",)
-        log["roadmap"] = "not for a base that moves or is held: population instead"
     if "roadmap" in wanted:
         paths = Roadmap(options.nodes, options.layers, options.optimised).starts(problem, coarse, rng)
         log["roadmap_paths"] = len(paths)
