@@ -30,6 +30,13 @@ class SingularityWatch:
     def judge(self, method: str, trajectory: Trajectory, statistics: dict[str, Any]) -> Solution:
         statistics = {**statistics, "smallest_singular_value_ratio": self.smallest}
         if self.smallest >= self.threshold:
-            return Solution(method, trajectory, Status.SOLVED, tracking_tolerance=self.max_drift, statistics=statistics)
+            return Solution(
+                method,
+                trajectory,
+                Status.SOLVED,
+                tracking_tolerance=self.max_drift,
+                grid=f"method.{method}.dt",
+                statistics=statistics,
+            )
         message = f"singular at t = {self.time:.2f} s (smallest singular value {self.smallest:.1e} of the largest)"
         return Solution(method, trajectory, Status.SINGULAR, message, event_time=self.time, statistics=statistics)

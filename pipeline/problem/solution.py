@@ -45,6 +45,7 @@ class Solution:
     `tracking_tolerance` [m] is what the method promises to keep of the path at its knots; the evaluation checks it.
     `limits_kept` are the kinds of limits that it promises to keep at its knots.
     `knots_only`: it goes from node to node of a grid, and promises nothing of the path between its knots.
+    `grid` is the key of the configuration that its knots come from.
     `found` is False where there is no motion to speak of: the trajectory then only holds the arm at its start.
     """
 
@@ -58,6 +59,7 @@ class Solution:
     limits_kept: tuple[str, ...] = ()
     found: bool = True
     knots_only: bool = False
+    grid: str = "timing.steps"
     statistics: dict[str, Any] = field(default_factory=dict)
 
     def to_frame(self) -> pd.DataFrame:
