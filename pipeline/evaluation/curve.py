@@ -25,7 +25,7 @@ class OffPath:
 
 def off_path(problem: Problem, plant: SinglePlant, time: Array, q: Array) -> OffPath:
     """How far the curve through the knots q (N + 1, n) is from its path; nan where it has none."""
-    if not np.all(np.isfinite(q)) or len(time) < 4:
+    if not np.all(np.isfinite(q)):
         return OffPath(np.nan, np.nan, (np.nan, np.nan))
     moments = np.interp(np.arange(INNER * (len(time) - 1) + 1) / INNER, np.arange(len(time)), time)
     motion, targets = whole(problem, time, q)(moments), problem.reference.position(moments)

@@ -22,7 +22,7 @@ from pipeline.evaluation.plant import SinglePlant
 from pipeline.evaluation.sums import differences, running_integral, weighted_sum
 from pipeline.problem.curve import turns_of_cycle
 from pipeline.problem.problem import Boundary, Problem
-from pipeline.problem.resolution import steps_needed
+from pipeline.problem.resolution import steps_needed, strays
 from pipeline.problem.solution import Solution, Status
 
 
@@ -155,7 +155,7 @@ def evaluate(problem: Problem, solution: Solution) -> Evaluation:
     integrals = {name: running_integral(rate, dt) for name, rate in rates.items()} | base.integrals
 
     status, message = solution.status, solution.message
-    if status is Status.SOLVED:
+    if status in (Status.SOLVED, Status.SINGULAR):
         status, message = _judge(moving, tracking, turned, excess, solution)
     if status is Status.SOLVED:
         status, message = _judge_between(problem, off, tracking, turned, solution)
@@ -201,9 +201,10 @@ def evaluate(problem: Problem, solution: Solution) -> Evaluation:
 def _judge(
     q: Array, tracking: Array, turned: Array, excess: dict[str, float], solution: Solution
 ) -> tuple[Status, str]:
-    if not np.all(np.isfinite(q)):
+    promised = solution.trajectory.time <= solution.until
+    if not np.all(np.isfinite(q[promised])):
         return Status.UNCONFIRMED, "the motion holds values that are not finite"
-    for error, unit in ((tracking, "m"), (turned, "rad")):
+    for error, unit in ((tracking[promised], "m"), (turned[promised], "rad")):
         worst = int(np.argmax(error))
         if error[worst] > solution.tracking_tolerance:
             return Status.UNCONFIRMED, (
@@ -214,7 +215,7 @@ def _judge(
     for kind in solution.limits_kept:
         if excess.get(kind, 0.0) > LIMITS:
             return Status.UNCONFIRMED, f"a {kind} limit is exceeded by {100 * excess[kind]:.2g} %"
-    return Status.SOLVED, solution.message
+    return solution.status, solution.message
 
 
 def _judge_between(
@@ -231,12 +232,13 @@ def _judge_between(
             (off.angle, turned, reference.orientation_tolerance, "rad", "orientation_tolerance"),
         )
     ):
+        where = (
+            f"between its knots the motion is up to {error:.2g} {unit} off its path (at t = {off.when[which]:.3g} s)"
+        )
+        if solution.knots_only and error > own.max() + max(allowed, strays(problem)[which]):
+            return Status.UNCONFIRMED, "; ".join([f"{where}: too few knots to show it ({solution.grid})", *notes])
         if error > own.max() + allowed and not solution.knots_only:
-            said = (
-                f"between its knots the motion is up to {error:.2g} {unit} off its path "
-                f"(at t = {off.when[which]:.3g} s), more than path.{key} = {allowed:g} {unit}; "
-                f"{_advice(problem, solution, error, which)}"
-            )
+            said = f"{where}, more than path.{key} = {allowed:g} {unit}; {_advice(problem, solution, error, which)}"
             return Status.UNCONFIRMED, "; ".join([said, *notes])
         if error > allowed:
             promise = (

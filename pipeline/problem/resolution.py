@@ -18,8 +18,8 @@ from pipeline.problem.problem import Problem
 MOST = 100_000  # intervals that may be advised
 SAFETY = (1.5, 5.0)  # on the measured error: for at most twice the knots, and for more
 ORDER = 4  # of the error of a cubic spline
-ROUNDING = 1e-12  # of the path's extent, or of a radian: an error below it says nothing
-STRAYS = 0.1  # of the path's extent, or [rad]: a motion that is off by more does not follow the path
+ROUNDING = 1e-12  # [m] and [rad]: an error below it says nothing
+STRAYS = 0.1  # of the path's extent, or [rad]
 WITHIN = np.array([0.382, 0.5])  # of an interval: one alone meets a circle again after whole turns
 ROUGH = 0.02  # of the path's extent, and [rad]: by how much a coarse grid's spline may be off
 
@@ -76,14 +76,18 @@ def steps_needed(problem: Problem, time: Array, off: float, which: int) -> int |
     """
     count, reference = len(time) - 1, problem.reference
     allowed = (reference.tolerance, reference.orientation_tolerance)[which]
-    scale = (_extent(problem), 1.0)[which]
     here = path_error(problem, _even(problem, count))[which]
-    if here <= ROUNDING * scale:  # as of a line at constant speed: what is off is the arm's alone
+    if here <= ROUNDING:  # as of a line at constant speed: what is off is the arm's alone
         needed = count * (SAFETY[1] * off / allowed) ** (1 / ORDER)
-        return _rounded(needed) if off <= STRAYS * scale and needed <= MOST else None
+        return _rounded(needed) if off <= strays(problem)[which] and needed <= MOST else None
     factor = max(off / here, 1.0)
     near, far = (_even_least(problem, count, allowed / (safety * factor), which) for safety in SAFETY)
     return near if near is not None and near <= 2 * count else far
+
+
+def strays(problem: Problem) -> tuple[float, float]:
+    """A motion that is off by more [m], [rad] does not follow the path."""
+    return STRAYS * _extent(problem), STRAYS
 
 
 def _extent(problem: Problem) -> float:

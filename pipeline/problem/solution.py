@@ -42,7 +42,8 @@ class Solution:
     """What a method returns: its motion, how it ended, and statistics of the solver (never used for reporting costs).
 
     `optimum` counts distinct optima of one method from 1 on. `event_time` [s] is when a singularity was met.
-    `tracking_tolerance` [m] is what the method promises to keep of the path at its knots; the evaluation checks it.
+    `tracking_tolerance` [m] is what the method promises to keep of the path at its knots, `until` a time [s] from which
+    on a singular motion is not to be used; the evaluation checks it.
     `limits_kept` are the kinds of limits that it promises to keep at its knots.
     `knots_only`: it goes from node to node of a grid, and promises nothing of the path between its knots.
     `grid` is the key of the configuration that its knots come from.
@@ -56,6 +57,7 @@ class Solution:
     optimum: int = 1
     event_time: float | None = None
     tracking_tolerance: float = np.inf
+    until: float = np.inf
     limits_kept: tuple[str, ...] = ()
     found: bool = True
     knots_only: bool = False
