@@ -21,7 +21,7 @@ class Status(enum.Enum):
     SOLVED = "solved: the motion follows the path and the method's own conditions hold"
     SINGULAR = "singular: the method ran into a singular configuration; its motion is not to be used from there on"
     NOT_CONVERGED = "not converged: the solver stopped before its conditions held; try more iterations or more starts"
-    INFEASIBLE = "infeasible: no motion was found that meets the path and every limit"
+    INFEASIBLE = "none found: of what was tried, no motion meets the path and every limit"
     UNCONFIRMED = "unconfirmed: the motion recomputed from q(t) does not do what the method claims"
 
     @property

@@ -1,4 +1,4 @@
-"""What says "solved", or "singular" from some time on, follows its path: of every method, judged by the exported curve."""
+"""What says "solved", or "singular" from some time on, follows its path: every method, by the exported curve."""
 
 from __future__ import annotations
 
