@@ -26,7 +26,7 @@ def between_knots(
     """The cubic spline through the knots: kinetic-energy integral (Simpson), objective, smallest clearance, excess of
     limits.
     """
-    if not np.all(np.isfinite(trajectory.q)) or len(trajectory.time) < 4:
+    if not np.all(np.isfinite(trajectory.q)):
         return float("nan"), float("nan"), float("nan"), {}
     # Only torques tie the first velocity to rest; the energy's sum lets it jump, and nothing prescribes the last one.
     torque_counts = problem.objective.second_order or bool(np.isfinite(problem.bounds.torque).any())

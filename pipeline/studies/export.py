@@ -10,9 +10,9 @@ import numpy as np
 
 from pipeline.common.arrays import Array
 from pipeline.evaluation.between import audit
-from pipeline.evaluation.curve import curve, whole
 from pipeline.evaluation.evaluation import Evaluation
 from pipeline.evaluation.limits import LIMITS
+from pipeline.problem.curve import curve, whole
 from pipeline.problem.problem import Problem
 from pipeline.studies.study import Motions, Result
 
