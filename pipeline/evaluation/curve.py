@@ -11,6 +11,7 @@ from scipy.interpolate import CubicSpline
 from pipeline.common.arrays import Array
 from pipeline.evaluation.plant import SinglePlant
 from pipeline.problem.problem import Boundary, Problem
+from pipeline.problem.solution import Trajectory
 from pipeline.problem.turns import full_turns
 
 CLOSES = 1e-6  # [rad] within which a cycle comes back, up to full turns
@@ -19,10 +20,12 @@ MOST = 100_000  # intervals that may be advised
 SAFETY = (1.5, 5.0)  # on the measured error: for at most twice the knots, and for more
 
 
-def curve(problem: Problem, time: Array, q: Array) -> CubicSpline:
-    """The C2 spline through the joints' knots q (N + 1, joints): from rest to rest for a path at rest, periodic up to
-    full turns for a cycle.
+def curve(problem: Problem, time: Array, q: Array, ends: Array | None = None) -> CubicSpline:
+    """The C2 spline through the joints' knots q (N + 1, joints), with the velocities `ends` (2, joints) of a motion
+    that is one; else from rest to rest for a path at rest, and periodic up to full turns for a cycle.
     """
+    if ends is not None:
+        return CubicSpline(time, q, bc_type=((1, ends[0]), (1, ends[1])))
     if problem.boundary is Boundary.CYCLIC and (winding := turns_of_cycle(problem, q)) is not None:
         rate = winding / (time[-1] - time[0])
         closed = q - rate * (time - time[0])[:, None]
@@ -40,10 +43,11 @@ def turns_of_cycle(problem: Problem, q: Array) -> Array | None:
     return turns if np.abs(q[-1] - q[0] - turns).max() <= CLOSES else None
 
 
-def whole(problem: Problem, time: Array, q: Array) -> Callable[..., Array]:
-    """The same curve with a moving base's coordinates before the joints': for q (N + 1, n)."""
+def whole(problem: Problem, trajectory: Trajectory) -> Callable[..., Array]:
+    """The same curve of a trajectory, with a moving base's coordinates before the joints'."""
+    time, q = trajectory.time, trajectory.q
     base_of, nb = problem.task.arm.base, problem.task.arm.base.count
-    joints = curve(problem, time, q[:, nb:])
+    joints = curve(problem, time, q[:, nb:], trajectory.ends)
     if not nb:
         return joints
     rest = problem.reference.timing.at_rest and problem.boundary is not Boundary.CYCLIC
@@ -61,12 +65,13 @@ class OffPath:
     when: tuple[float, float]
 
 
-def off_path(problem: Problem, plant: SinglePlant, time: Array, q: Array) -> OffPath:
-    """How far the curve through the knots q (N + 1, n) is from its path; nan where it has none."""
+def off_path(problem: Problem, plant: SinglePlant, trajectory: Trajectory) -> OffPath:
+    """How far the curve of a trajectory is from its path; nan where it has none."""
+    time, q = trajectory.time, trajectory.q
     if not np.all(np.isfinite(q)) or len(time) < 4:
         return OffPath(np.nan, np.nan, (np.nan, np.nan))
     moments = np.interp(np.arange(INNER * (len(time) - 1) + 1) / INNER, np.arange(len(time)), time)
-    motion, targets = whole(problem, time, q)(moments), problem.reference.position(moments)
+    motion, targets = whole(problem, trajectory)(moments), problem.reference.position(moments)
     error = np.empty((len(moments), 2))
     for i in range(len(moments)):
         plant.at(motion[i], np.zeros_like(motion[i]))
