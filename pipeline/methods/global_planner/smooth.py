@@ -52,6 +52,7 @@ class _Solver:
 
     options: GlobalOptions
     solves: list[dict[str, Any]] = field(default_factory=list)
+    last: Curve | None = None  # that a solve has converged to
 
     @property
     def given(self) -> dict[str, Any]:
@@ -61,6 +62,7 @@ class _Solver:
     def note(self, solved: Solved) -> Solved:
         entry = {"solver": "ipopt, spline", "intervals": len(solved.curve.times) - 1, "iterations": solved.iterations}
         self.solves.append(entry | {"wall_time_s": solved.outcome.wall_time, "status": solved.outcome.status})
+        self.last = solved.curve if solved.outcome.converged else self.last
         return solved
 
     def lazily(self, problem: Problem, guess: Curve) -> Solved:
@@ -157,7 +159,8 @@ def refine(context: tuple[Problem, GlobalOptions], motion: Array) -> Smooth:
     kept = all(float(excess.max()) <= ENOUGH for excess in excesses(problem, solved.curve).values())
     status = solved.outcome.status if kept or not solved.outcome.converged else "exceeds a limit between its knots"
     good = kept and solved.outcome.converged
-    return Smooth(solved.curve, good, status, objective(problem, solved.curve), solver.solves)
+    curve = solved.curve if good or solver.last is None else solver.last
+    return Smooth(curve, good, status, objective(problem, curve), solver.solves)
 
 
 def shortest(context: tuple[Problem, GlobalOptions], start: Curve) -> Smooth:

@@ -17,7 +17,7 @@ from pipeline.program.spline.transcription import transcribe
 BETWEEN = 10  # points per interval
 
 
-ROUNDS = 5
+ROUNDS = 8
 
 
 MARGIN = 1e-4  # relative, on what is tightened
@@ -88,11 +88,12 @@ def without_forces(problem: Problem) -> Problem:
 def tighten(problem: Problem, first: Solved, **options: object) -> tuple[Solved, list[Solved]]:
     """The optimum that keeps its limits between the knots as well as at them, and all solves after the first.
 
-    Where a limit is exceeded in an interval its bounds at both knots are divided by that excess and a little more.
+    Where a limit is exceeded in an interval its bounds at both knots are divided by that excess and a little more; from
+    round to round by more of it, since what lies between two knots may give way by less than they do.
     """
     solved, further, tightened = first, [], Tightened.none(problem, first.curve.times)
-    for _ in range(ROUNDS):
-        stricter = _stricter(problem, solved.curve, tightened)
+    for count in range(ROUNDS):
+        stricter = _stricter(problem, solved.curve, tightened, 1.0 + count)
         if stricter is None or not solved.outcome.converged:
             break
         tightened = stricter
@@ -101,7 +102,7 @@ def tighten(problem: Problem, first: Solved, **options: object) -> tuple[Solved,
     return solved, further
 
 
-def _stricter(problem: Problem, curve: Curve, tightened: Tightened) -> Tightened | None:
+def _stricter(problem: Problem, curve: Curve, tightened: Tightened, gain: float) -> Tightened | None:
     """Limits at the knots that leave out what this spline exceeds between them; None if it does not."""
     found = excesses(problem, curve)
     factors = {}
@@ -110,7 +111,7 @@ def _stricter(problem: Problem, curve: Curve, tightened: Tightened) -> Tightened
         if kind in found:
             beyond = np.maximum(found[kind], 0.0)
             inner = np.lib.stride_tricks.sliding_window_view(beyond, BETWEEN + 1, axis=0)[::BETWEEN].max(axis=-1)
-            inner = np.where(inner > KEPT, inner + MARGIN, 0.0)
+            inner = np.where(inner > KEPT, gain * inner + MARGIN, 0.0)
             own[:-1] = np.minimum(own[:-1], getattr(tightened, kind)[:-1] / (1 + inner))
             own[1:] = np.minimum(own[1:], getattr(tightened, kind)[1:] / (1 + inner))
     lacking = 0.0
@@ -120,5 +121,5 @@ def _stricter(problem: Problem, curve: Curve, tightened: Tightened) -> Tightened
     exceeded = any(float(found[kind].max()) > KEPT for kind in ("torque", "power") if kind in found)
     if not exceeded and not lacking:
         return None
-    more = 1.2 * lacking + 1e-7 if lacking else 0.0
+    more = (0.2 + gain) * lacking + 1e-7 if lacking else 0.0
     return Tightened(factors["torque"], factors["power"], tightened.keep_off + more)
