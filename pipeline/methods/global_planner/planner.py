@@ -20,6 +20,7 @@ from pipeline.methods.global_planner.batch import Batch
 from pipeline.methods.global_planner.grids import coarsest, finer, on_knots, refinement
 from pipeline.methods.global_planner.optimum import Optimum, go_on, optimise_start, refine
 from pipeline.methods.global_planner.reasons import no_feasible, no_optimum, no_start
+from pipeline.methods.global_planner.smooth import rough, smooth, splined, unserved
 from pipeline.methods.method import ANY, Context, Method
 from pipeline.model.kinematics import wrap
 from pipeline.problem.limits import LIMIT_KINDS
@@ -60,6 +61,13 @@ HOPELESS = 0.1  # relative violation on a coarse grid from which on finer ones a
 
 def solve(problem: Problem, options: GlobalOptions, context: Context) -> list[Solution]:
     """The distinct optima found from these starts, best first."""
+    if not splined(problem, options):
+        return by_differences(problem, options, context)
+    return smooth(problem, by_differences(rough(problem), options, context), options, context)
+
+
+def by_differences(problem: Problem, options: GlobalOptions, context: Context) -> list[Solution]:
+    """The same on the knots alone, as the papers have it."""
     why = Batch.without(problem, options)
     times, too_coarse = on_knots(problem, options.refine_to)
     if too_coarse:
@@ -125,10 +133,12 @@ def solve(problem: Problem, options: GlobalOptions, context: Context) -> list[So
 
 
 def refuses(problem: Problem, options: GlobalOptions) -> str | None:
-    """Starts by dynamic programming serve only what that method serves."""
+    """Starts by dynamic programming serve only what that method serves; differences know no rest."""
+    if why := unserved(problem, options):
+        return why
     if "dynamic_programming" not in STARTS[options.starts]:
         return None
-    why = dynamic_programming.dynamic_programming.why_not(problem)
+    why = dynamic_programming.dynamic_programming.why_not(rough(problem))
     return why and f"method.global.starts = {options.starts}: {why}; starts = roadmap serves every problem"
 
 
