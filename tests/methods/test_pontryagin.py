@@ -54,7 +54,9 @@ def stated(case: str, boundary: str = "fixed", steps: int = 200, **other: object
 
 @cache
 def extremals(case: str, boundary: str) -> list[Solution]:
-    return pontryagin(stated(case, boundary), PontryaginOptions(guesses=3, max_nodes=20000 if case == "case4" else 2000))
+    return pontryagin(
+        stated(case, boundary), PontryaginOptions(guesses=3, max_nodes=20000 if case == "case4" else 2000)
+    )
 
 
 @pytest.mark.parametrize(
