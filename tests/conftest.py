@@ -150,7 +150,7 @@ def reproduce_in(folder: Path) -> None:
     # Its law is one of large numbers.
     many = (
         *(f"method.global.{key}" for key in ("candidates=300", "optimised=16", "solver=newton")),
-        "candidate_study.repeats=4",
+        "candidate_study.repeats=2",
     )
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("HYDRA_FULL_ERROR", "0")  # the command line sets it; this puts it back

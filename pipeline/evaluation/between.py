@@ -17,10 +17,8 @@ from pipeline.evaluation.sums import weighted_sum
 from pipeline.problem.problem import Boundary, Problem
 from pipeline.problem.solution import Trajectory
 
-CLEARANCES = 5  # of those at which distances from obstacles are taken
-
-
 BETWEEN = 10  # sub-intervals per knot interval on which the motion between knots is judged
+CLEARANCES = 5  # of those at which distances from obstacles are taken
 
 
 @dataclass(frozen=True)
@@ -43,7 +41,7 @@ def between_knots(
     problem: Problem, plant: SinglePlant, clearance: Clearance, trajectory: Trajectory, qd_start: Array
 ) -> Between:
     """The spline that a motion is; or the one through its knots, from rest where torques count."""
-    if not np.all(np.isfinite(trajectory.q)) or len(trajectory.time) < 4:
+    if not np.all(np.isfinite(trajectory.q)):
         return Between()
     # Only torques tie the first velocity to rest; the energy's sum lets it jump, and nothing prescribes the last one.
     torque_counts = problem.objective.second_order or bool(np.isfinite(problem.bounds.torque).any())
@@ -59,14 +57,13 @@ def between_knots(
     moments = (trajectory.time[:-1, None] + dt[:, None] * fraction).ravel()
     q, qd, qdd = spline(moments), spline(moments, 1), spline(moments, 2)
     jerk = np.repeat(6 * spline.c[0], BETWEEN + 1, axis=0)  # constant in every interval
-    energy, secondary, turn = np.zeros((3, len(moments)))
-    tau, nb = np.zeros_like(q), plant.nb
-    spinning = np.zeros(len(moments))
+    energy, secondary, spinning = np.zeros((3, len(moments)))
+    tau, nb, way = np.zeros_like(q), plant.nb, np.tile(plant.start, (len(moments), 1, 1))
     for i in range(len(moments)):
         plant.at(q[i], qd[i])
         energy[i] = plant.kinetic_energy()
-        turn[i] = angle_between(plant.start, plant.base()[1][None])[0]
-        spinning[i] = plant.spin_squared()
+        if nb:
+            way[i], spinning[i] = plant.base()[1], plant.spin_squared()
         if problem.bounds.any or smooth:
             tau[i] = plant.torque(qdd[i])
         if problem.objective.secondary:
@@ -79,7 +76,8 @@ def between_knots(
     }
     ends_at = {name: float(running[name][-1]) for name in running}
     clear = float(clearance(q[:: BETWEEN // CLEARANCES]).min())
-    excess = limit_excess(problem, q, qd, tau, clear, float(turn.max()), qdd=qdd, jerk=jerk)
+    turn = float(angle_between(plant.start, way).max())
+    excess = limit_excess(problem, q, qd, tau, clear, turn, qdd=qdd, jerk=jerk)
     return Between(weighted_sum(problem, ends_at, ends_at["secondary"]), clear, excess, running)
 
 
@@ -96,12 +94,12 @@ class Audit:
 def audit(problem: Problem, time: Array, q: Array, qd: Array, qdd: Array, jerk: Array) -> Audit:
     """Judge samples (K, n) that come with their own velocities, accelerations and jerks, at times (K,)."""
     plant, targets = SinglePlant(problem.task.arm), problem.reference.position(time)
-    error, turned, turn, tau = np.empty(len(time)), np.empty(len(time)), np.empty(len(time)), np.empty_like(q)
+    error, turned, way, tau = np.empty(len(time)), np.empty(len(time)), np.empty((len(time), 3, 3)), np.empty_like(q)
     for i in range(len(time)):
         plant.at(q[i], qd[i])
         error[i], turned[i] = plant.task_error(problem.task, targets[i])
-        tau[i] = plant.torque(qdd[i])
-        turn[i] = angle_between(plant.start, plant.base()[1][None])[0]
+        tau[i], way[i] = plant.torque(qdd[i]), plant.base()[1]
+    turn = angle_between(plant.start, way)
     clearance = Clearance(problem.task.arm, problem.obstacles)(q)
     worst = {
         kind: tuple(int(place) for place in np.unravel_index(int(np.argmax(excess)), excess.shape))

@@ -55,6 +55,7 @@ def solve(problem: Problem, options: DynamicProgrammingOptions, context: Context
             optimum=rank + 1,
             tracking_tolerance=TRACKING,
             knots_only=True,
+            grid="method.dynamic_programming.intervals",
             limits_kept=("position", "velocity", "clearance"),
             statistics={"cost": float(costs[index]), **(log if rank == 0 else {})},
         )

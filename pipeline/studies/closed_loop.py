@@ -24,10 +24,10 @@ from pydrake.trajectories import PiecewisePolynomial
 
 from pipeline.common.arrays import Array
 from pipeline.config.studies import ClosedLoopConfig
-from pipeline.evaluation.curve import curve
 from pipeline.evaluation.evaluation import Evaluation
 from pipeline.model.arm import Arm
 from pipeline.model.stack import assemble
+from pipeline.problem.curve import curve
 from pipeline.problem.problem import Problem
 from pipeline.studies import style
 from pipeline.studies.export import chosen

@@ -10,8 +10,8 @@ import numpy as np
 
 from pipeline.common.arrays import Array
 from pipeline.evaluation.between import Audit, audit
-from pipeline.evaluation.curve import curve, end_speeds, whole
 from pipeline.evaluation.evaluation import Evaluation
+from pipeline.problem.curve import curve, end_speeds, whole
 from pipeline.problem.problem import Problem
 from pipeline.studies.study import Motions, Result
 

@@ -25,7 +25,7 @@ from pipeline.studies.export import Nothing, Resampled, resample, sentence, stud
 from pipeline.studies.study import Motions, Result
 from tests.support import ROOT, composed
 
-FEW = GlobalOptions(candidates=60, optimised=2)
+FEW = GlobalOptions(candidates=60, optimised=2, refine_to=None)
 Case = tuple[Problem, Evaluation]
 
 
