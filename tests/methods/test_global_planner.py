@@ -14,7 +14,8 @@ from pipeline.common.workers import Workers
 from pipeline.config.compose import checked
 from pipeline.config.run import RunConfig
 from pipeline.evaluation.evaluation import Evaluation, evaluate
-from pipeline.methods.global_planner.planner import global_planner, refinement
+from pipeline.methods.global_planner.grids import refinement
+from pipeline.methods.global_planner.planner import global_planner
 from pipeline.methods.method import Context
 from pipeline.path.curves import Line
 from pipeline.path.reference import Reference
