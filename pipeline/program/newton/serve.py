@@ -30,6 +30,7 @@ def why_not(problem: Problem) -> str | None:
         "reactions in the objective": objective.second_order and not objective.weight("torque"),
         "a secondary criterion": objective.secondary is not None,
         "neither velocities nor torques in the objective": not any(map(objective.weight, SERVED)),
+        "rest, or limits of accelerations or jerks": any(problem.rest) or problem.bounds.smooth,
         "bounds on integrals": bool(problem.bounds_of_integrals),
         "obstacles and torques at once": problem.obstacles is not None and _torques(problem),
         "so few intervals": len(problem.times) <= FEWEST[_torques(problem)],
