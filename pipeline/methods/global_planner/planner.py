@@ -63,7 +63,10 @@ def solve(problem: Problem, options: GlobalOptions, context: Context) -> list[So
     """The distinct optima found from these starts, best first."""
     if not splined(problem, options):
         return by_differences(problem, options, context)
-    return smooth(problem, by_differences(rough(problem), options, context), options, context)
+    found = by_differences(rough(problem), options, context)
+    if found[0].found:  # on the knots that the path needs
+        problem = replace(problem, times=found[0].trajectory.time)
+    return smooth(problem, found, options, context)
 
 
 def by_differences(problem: Problem, options: GlobalOptions, context: Context) -> list[Solution]:
