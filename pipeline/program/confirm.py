@@ -24,6 +24,8 @@ HANDOVER = {
     "slack_bound_push": 1e-14,
     "slack_bound_frac": 1e-14,
     "nlp_scaling_method": "none",
+    "constr_mult_init_max": 1e8,  # else the first multipliers of long rows are put to zero
+    "acceptable_iter": 3,  # where rounding keeps IPOPT from its last digits, at an optimum it cannot gain any
 }
 
 
@@ -43,9 +45,11 @@ class Confirmation:
     optimality: float
 
 
-def confirm(problem: Problem, times: Array, q: Array, *, tolerance: float, max_iterations: int) -> Confirmation:
-    """IPOPT's own answer from q (N + 1, n)."""
-    program = transcribe(problem, times, q)
+def confirm(
+    problem: Problem, times: Array, q: Array, *, tolerance: float, max_iterations: int, keep_off: float = 0.0
+) -> Confirmation:
+    """IPOPT's own answer from q (N + 1, n); keep_off [m]: as in `transcribe`."""
+    program = transcribe(problem, times, q, keep_off=keep_off)
     final, outcome, iterations = program.solve(tolerance=tolerance, max_iterations=max_iterations, extra=HANDOVER)
     moved, left = float(np.abs(final - q).max()), residuals(program.drake, outcome.result)
     return Confirmation(final, outcome.converged, outcome.status, iterations, outcome.wall_time, moved, *left)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from pipeline.common.arrays import Array
 from pipeline.problem.problem import Boundary, Problem
 from pipeline.problem.turns import full_turns
+from pipeline.search.floating import OnMovingBase
 from pipeline.search.layers import Edges, closed_paths, through_every_node
 from pipeline.search.manifold import Manifold
 from pipeline.search.selection import diverse
@@ -36,13 +37,15 @@ class Roadmap:
     def __init__(
         self, problem: Problem, grid: Array, rng: np.random.Generator, *, nodes: int = 300, layers: int = 6
     ) -> None:
-        self.problem, self.grid, self.rng, self.manifold = problem, grid, rng, Manifold(problem)
+        self.problem, self.grid, self.rng = problem, grid, rng
+        self.manifold = OnMovingBase(problem) if problem.task.arm.base.count else Manifold(problem)
         self.closed = problem.boundary is Boundary.CYCLIC
         self.times = np.interp(np.linspace(0, len(grid) - 1, layers + 1), np.arange(len(grid)), grid)
         self.nodes = _Sampler(self.manifold, self.times, nodes, rng).layers()
+        self._more = 1  # times as many nodes of each layer as `random` would need without velocity limits
         self.edges: Edges = []
         if min(map(len, self.nodes)):
-            self.edges = edge_costs(self.manifold, self.times, self.nodes, problem.bounds.velocity)
+            self.edges = self._costs(problem.bounds.velocity[self.manifold.joints])
 
     def cheapest(self, most: int) -> Array:
         """At most `most` of the cheapest motions through every node, cheap and spread out."""
@@ -50,8 +53,7 @@ class Roadmap:
             return self._none
         paths, costs = self._paths(self.edges)
         if not len(paths):  # too fast everywhere: what is nearest to the limits is for the solver to find
-            free = np.full(self.manifold.n, np.inf)
-            self.edges = edge_costs(self.manifold, self.times, self.nodes, free)
+            self.edges = self._costs(np.full_like(self.problem.bounds.velocity[self.manifold.joints], np.inf))
             paths, costs = self._paths(self.edges)
         coarse, costs = self._unwound(paths, costs)
         if not len(coarse):
@@ -68,12 +70,15 @@ class Roadmap:
         for _ in range(count):
             if not self.edges or sum(map(len, found)) >= count:
                 break
-            size = int(self.rng.integers(2, FEW + 1))
+            size = self._more * int(self.rng.integers(2, FEW + 1))
             few = [np.sort(self.rng.choice(len(layer), min(size, len(layer)), replace=False)) for layer in self.nodes]
             if self.closed:
                 few[-1] = few[0]
             paths, _ = self._paths([edge[np.ix_(*ends)] for edge, *ends in zip(self.edges, few, few[1:], strict=False)])
-            some = paths[self.rng.permutation(len(paths))[:size]]
+            if not len(paths):  # too fast, all of them
+                self._more *= 2
+                continue
+            some = paths[self.rng.permutation(len(paths))[:FEW]]
             found.append(np.stack([nodes[column] for nodes, column in zip(few, some.T, strict=True)], axis=1))
         if not found:
             return self._none
@@ -83,6 +88,9 @@ class Roadmap:
     @property
     def _none(self) -> Array:
         return np.empty((0, len(self.grid), self.manifold.n))
+
+    def _costs(self, velocity: Array) -> Edges:
+        return edge_costs(self.manifold, self.times, self.nodes, velocity)
 
     def _paths(self, edges: Edges) -> tuple[NDArray[np.int_], Array]:
         return closed_paths(edges) if self.closed else through_every_node(edges)
@@ -99,28 +107,25 @@ class Roadmap:
 
     def _on_grid(self, coarse: Array) -> Array:
         """The motions between layers, put onto the path at the knots `grid`; without those that lose it."""
-        manifold, times, grid, problem = self.manifold, self.times, self.grid, self.problem
+        manifold, times, grid = self.manifold, self.times, self.grid
         if not len(coarse):
             return self._none
         at = np.clip(np.searchsorted(times, grid, side="right") - 1, 0, len(times) - 2)
         share = ((grid - times[at]) / (times[at + 1] - times[at]))[:, None]
-        q = np.clip(coarse[:, at] * (1 - share) + coarse[:, at + 1] * share, manifold.lower, manifold.upper)
-        target = np.tile(problem.reference.position(grid), (len(q), 1))
-        flat, arrived = manifold.project(q.reshape(-1, manifold.n), target, steps=12, tolerance=1e-7)
-        motions = flat.reshape(q.shape)
-        if problem.boundary is Boundary.FIXED:
-            motions[:, 0] = problem.q_init
-        if self.closed:
-            motions[:, -1] = motions[:, 0] + full_turns(problem, motions[:, 0], motions[:, -1])
-        return np.asarray(motions[arrived.reshape(len(q), -1)[:, 1:].all(axis=1)])
+        wished = np.clip(coarse[:, at] * (1 - share) + coarse[:, at + 1] * share, manifold.lower, manifold.upper)
+        motions, arrived = manifold.along(grid, wished)
+        return np.asarray(motions[arrived])
 
 
 def edge_costs(manifold: Manifold, times: Array, nodes: list[Array], velocity: Array) -> Edges:
-    """Of every pair of neighbours 1/2 d'G d/dt, G the mean of both ends' metrics; infinite beyond `velocity` (n,)."""
+    """Of every pair of neighbours 1/2 d'G d/dt of the joints, G the mean of both ends' metrics; infinite beyond
+    `velocity` (joints,).
+    """
     roots = [np.linalg.cholesky(manifold.metric(layer)) for layer in nodes]
-    n, edges = manifold.n, []
+    n, edges = len(velocity), []
     for i, dt in enumerate(np.diff(times)):
-        d = manifold.wrap(nodes[i + 1][None] - nodes[i][:, None]).transpose(2, 0, 1).astype(np.float32)
+        d = manifold.wrap(nodes[i + 1][None] - nodes[i][:, None])[..., manifold.joints]
+        d = d.transpose(2, 0, 1).astype(np.float32)
         cost = np.zeros(d.shape[1:], np.float32)
         for column in range(n):  # |L'd|^2 for both ends' roots
             for root, axes in ((roots[i + 1], np.s_[None, :]), (roots[i], np.s_[:, None])):
@@ -145,11 +150,11 @@ class _Sampler:
     def layers(self) -> list[Array]:
         closed = self.manifold.problem.boundary is Boundary.CYCLIC
         for layer in range(0 if self.given is None else 1, self.last if closed else self.last + 1):
-            self.parts[layer].append(self.manifold.draw(self.x[layer], self.count // 2, self.rng))
+            self.parts[layer].append(self._drawn(layer, self.count // 2))
         first = max(1, self.last // 4) if self.given is not None else 0
         bases = sorted({first, self.last // 2, self.last})
         for base in bases:
-            drawn = self.manifold.draw(self.x[base], max(1, self.count // 2 // len(bases)), self.rng)
+            drawn = self._drawn(base, max(1, self.count // 2 // len(bases)))
             self.parts[base].append(drawn)
             self._carry(drawn, base, 1)
             self._carry(drawn, base, -1)
@@ -160,14 +165,22 @@ class _Sampler:
             self.parts[-1] = self.parts[0]
         return [np.concatenate(part) for part in self.parts]
 
+    def _drawn(self, layer: int, count: int) -> Array:
+        draw = self.manifold.draw if layer else self.manifold.first
+        return draw(self.x[layer], count, self.rng)
+
     def _carry(self, q: Array, layer: int, direction: int) -> None:
         """Along the path to its end, as far as the limits allow, in two steps from layer to layer."""
-        end = self.last if direction > 0 else 0 if self.given is None else 1
-        while layer != end and len(q):
+        # Where a motion begins, a base that moves stands where it stands.
+        first = 1 if self.given is not None or self.manifold.problem.task.arm.base.count else 0
+        end = self.last if direction > 0 else first
+        while (end - layer) * direction > 0 and len(q):
             ahead = layer + direction
-            for time in (0.5 * (self.times[layer] + self.times[ahead]), self.times[ahead]):
+            half = 0.5 * (self.times[ahead] - self.times[layer])
+            for time in (self.times[ahead] - half, self.times[ahead]):
                 target = np.tile(self.manifold.problem.reference.position(np.array([time])), (len(q), 1))
                 if len(q):
+                    q = self.manifold.wait(q, half)
                     q, arrived = self.manifold.project(q, target, self.manifold.metric(q), steps=10)
                     q = q[arrived]
                     q = q[self.manifold.allowed(q)]

@@ -8,6 +8,7 @@ knots by cubic splines, halving the step. What is listed are the optima found fr
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -17,14 +18,17 @@ from pipeline.common.arrays import Array
 from pipeline.config.methods import GlobalOptions
 from pipeline.methods import dynamic_programming
 from pipeline.methods.global_planner.basins import Basins, basins
-from pipeline.methods.global_planner.batch import Batch
+from pipeline.methods.global_planner.batch import JUMPS, Batch
+from pipeline.methods.global_planner.grids import coarsest, finer, on_knots, refinement
 from pipeline.methods.global_planner.optimum import Optimum, go_on, optimise_start, refine
 from pipeline.methods.global_planner.reasons import no_feasible, no_optimum, no_start
+from pipeline.methods.global_planner.smooth import rough, smooth, splined, unserved
 from pipeline.methods.global_planner.starts import Starts
 from pipeline.methods.method import ANY, Context, Method
 from pipeline.model.kinematics import wrap
 from pipeline.problem.limits import LIMIT_KINDS
 from pipeline.problem.problem import Problem
+from pipeline.problem.resolution import MOST
 from pipeline.problem.solution import Solution, Status, Trajectory
 from pipeline.program.feasibility import Relaxed, least_violation
 
@@ -43,9 +47,6 @@ STEPS = 25  # intervals of the coarsest grid: 12 miss optima
 STEPS_ALONE = 12  # where each start costs a solve of its own
 
 
-JUMPS = 0.1  # of the path's length: an optimum that leaves it so far between coarse knots is not refined
-
-
 DEAREST = 3.5  # times the best: dearer optima are not refined, nor does it count that they are new
 
 
@@ -54,15 +55,29 @@ HOPELESS = 0.1  # relative violation on a coarse grid from which on finer ones a
 
 def solve(problem: Problem, options: GlobalOptions, context: Context) -> list[Solution]:
     """The distinct optima found from these starts, best first."""
+    if not splined(problem, options):
+        return by_differences(problem, options, context)
+    found = by_differences(rough(problem), options, context)
+    if found[0].found:  # on the knots that the path needs
+        problem = replace(problem, times=found[0].trajectory.time)
+    return smooth(problem, found, options, context)
+
+
+def by_differences(problem: Problem, options: GlobalOptions, context: Context) -> list[Solution]:
+    """The same on the knots alone, as the papers have it."""
     why = Batch.without(problem, options)
-    grids = refinement(problem.times, options.coarse_steps or (STEPS if why is None else STEPS_ALONE))
+    times, too_coarse = on_knots(problem, options.refine_to)
+    if too_coarse:
+        return [_nothing(problem, Status.NOT_CONVERGED, too_coarse, {})]
+    asked, problem = len(problem.times) - 1, replace(problem, times=times)
+    grids = refinement(times, coarsest(problem, options.coarse_steps, STEPS if why is None else STEPS_ALONE))
     drawn = Starts(problem, grids[0], options, np.random.default_rng(context.seed))
     motions, log = drawn.first, drawn.log
     if not len(motions):
         return [_nothing(problem, Status.INFEASIBLE, no_start(problem, log.get("drawn", 0)), log)]
 
     batch = Batch(problem, options) if why is None else None
-    log["solver"] = "newton, confirmed by ipopt" if why is None else f"ipopt ({why})"
+    log["solver"] = f"ipopt ({why})" if batch is None else batch.words
     while True:
         starts = _optimise_starts(problem, grids[0], options, motions, batch, context)
         if any(start.converged for start in starts):
@@ -78,19 +93,24 @@ def solve(problem: Problem, options: GlobalOptions, context: Context) -> list[So
             break
         # A coarse grid can be infeasible where a finer one is not: its finite differences are other numbers.
         motions, grids = CubicSpline(grids[0], motions[:FEWER], axis=1)(grids[1]), grids[1:]
-    if batch is None or not batch.whole:  # a start costs a solve of its own: one lot of them must do
+    if batch is None or not batch.cheap:  # a start costs a solve of its own: one lot of them must do
         coarse = basins(problem, grids[0], starts, options.same_path)
     else:
         starts, coarse = _draw_on(problem, options, drawn, grids[0], starts, batch, context)
-    log["grids"] = [len(grid) - 1 for grid in grids]
     log["starts"] = [
         {"converged": start.converged, "cost": start.cost, "status": start.status, "solves": start.solves}
         for start in starts
     ]
     log["barren_starts"] = coarse.barren
     refined = _refine_all(problem, grids, options, coarse.optima, batch, context)
-    pairs = zip(refined, coarse.members, strict=True)
-    found = [(fine, members) for fine, members in pairs if fine.converged and fine.continuous]
+    while (parted := finer(problem, options.refine_to, [fine.q for fine in refined if _good(fine)])) is not None:
+        problem, grids = replace(problem, times=parted), [*grids, parted]
+        again = [fine for fine in refined if _good(fine)]
+        batch = batch and Batch(problem, options)
+        newer = iter(_refine_all(problem, grids[-2:], options, again, batch, context))
+        refined = [next(newer) if _good(fine) else fine for fine in refined]
+    log["grids"] = [len(grid) - 1 for grid in grids]
+    found = [(fine, members) for fine, members in zip(refined, coarse.members, strict=True) if _good(fine)]
     log["jumping_optima"] = coarse.jumping + sum(fine.converged and not fine.continuous for fine in refined)
     if not found:
         return [_nothing(problem, Status.NOT_CONVERGED, no_optimum(problem, grids[0], starts, refined), log)]
@@ -106,10 +126,12 @@ def solve(problem: Problem, options: GlobalOptions, context: Context) -> list[So
                 "global",
                 Trajectory(problem.times, fine.q),
                 Status.SOLVED,
+                _said(problem, asked, options, [fine.q for fine, _ in found]) if rank == 0 else "",
                 optimum=rank + 1,
                 tracking_tolerance=TRACKING,
                 limits_kept=LIMIT_KINDS,
                 evidence=(words if rank == 0 else "") + fine.evidence,
+                knots_only=options.refine_to is None,
                 statistics={**(log if rank == 0 else {}), **own},
             )
         )
@@ -117,26 +139,28 @@ def solve(problem: Problem, options: GlobalOptions, context: Context) -> list[So
 
 
 def refuses(problem: Problem, options: GlobalOptions) -> str | None:
-    """Starts by dynamic programming serve only what that method serves."""
+    """Starts by dynamic programming serve only what that method serves; differences know no rest."""
+    if why := unserved(problem, options):
+        return why
     if "dynamic_programming" not in options.generators:
         return None
-    why = dynamic_programming.dynamic_programming.why_not(problem)
-    return (
-        why and f"method.global.starts = {', '.join(options.generators)}: {why}; starts = roadmap serves every problem"
-    )
+    why, words = dynamic_programming.dynamic_programming.why_not(rough(problem)), ", ".join(options.generators)
+    return why and f"method.global.starts = {words}: {why}; starts = roadmap serves every problem"
 
 
 global_planner = Method("global", "Global optimum", "#2F855A", GlobalOptions, ANY, solve, refuses)
 
 
-def refinement(times: Array, coarse_steps: int) -> list[Array]:
-    """Grids from coarse to fine: at most coarse_steps intervals, doubled until the wanted knots `times` are reached."""
-    intervals = len(times) - 1
-    sizes = [intervals]
-    while sizes[0] > coarse_steps:
-        sizes.insert(0, max(2, sizes[0] // 2))
-    place = np.arange(intervals + 1)
-    return [np.interp(np.linspace(0, intervals, size + 1), place, times) for size in sizes]
+def _good(optimum: Optimum) -> bool:
+    return optimum.converged and optimum.continuous
+
+
+def _said(problem: Problem, asked: int, options: GlobalOptions, motions: list[Array]) -> str:
+    """That the grid is not the one that was asked for, and not the one that would do."""
+    count = len(problem.times) - 1
+    said = f"on {count} intervals: the {asked} of timing.steps are too few for path.tolerance" * (count > asked)
+    more = options.refine_to is not None and finer(problem, MOST, motions) is not None
+    return "; ".join(filter(None, [said, f"method.global.refine_to = {options.refine_to} allows no more" * more]))
 
 
 def _draw_on(
@@ -183,13 +207,18 @@ def _optimise_starts(
     if not any(first.converged for first in firsts):
         # IPOPT's restoration leaves motions that break limits for others farther away.
         return _optimise_starts(problem, grid, options, motions[:ELASTIC_STARTS], None, context)
-    if batch.whole:
+    if batch.first is problem:
         for count, first in enumerate(firsts, 1):
             done(count, first)
         return firsts
     # Where starts have come to the same motion, one of them goes on for all.
     chosen = basins(problem, grid, firsts, options.same_path).optima
-    further = context.workers.map(go_on, (problem, grid, options), chosen, done)
+    served = batch.further(grid, chosen)
+    left = [first for first, optimum in zip(chosen, served, strict=True) if optimum is None]
+    others = iter(context.workers.map(go_on, (problem, grid, options), left, done))
+    further = [next(others) if optimum is None else optimum for optimum in served]
+    for count, optimum in enumerate(filter(None, served), len(left) + 1):
+        done(count, optimum)
     return [further[_nearest(problem, first, chosen)] if first.converged else first for first in firsts]
 
 
@@ -208,8 +237,7 @@ def _refine_all(
     context: Context,
 ) -> list[Optimum]:
     """Every basin on the last grid: in one batch, and those that it does not finish one by one."""
-    alone = batch is None or problem.objective.second_order
-    refined = [None] * len(basins) if batch is None or alone else batch.refine(grids, basins)
+    refined = [None] * len(basins) if batch is None else batch.refine(grids, basins)
     left = [basin for basin, optimum in zip(basins, refined, strict=True) if optimum is None]
     others = iter(context.workers.map(refine, (problem, grids, options), left))
     return [next(others) if optimum is None else optimum for optimum in refined]

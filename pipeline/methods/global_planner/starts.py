@@ -54,9 +54,6 @@ class Starts:
 def _roadmap(starts: Starts) -> tuple[Array, Further]:
     """Of nothing within the limits or clear of obstacles what comes nearest is the solver's to say."""
     problem, options = starts.problem, starts.options
-    if problem.task.arm.base.count:
-        starts.log["roadmap"] = "not for a base that moves or is held: population instead"
-        return _instead(starts)
     roadmap = Roadmap(problem, starts.grid, starts.rng, nodes=options.nodes, layers=options.layers)
     paths = roadmap.cheapest(options.optimised)
     starts.log["roadmap_paths"] = len(paths)
