@@ -162,6 +162,7 @@ class Batch:
         )
         entry = {"solver": "ipopt", "intervals": len(times) - 1, "iterations": told.iterations, "moved": told.moved}
         entry |= {"wall_time_s": told.wall_time, "status": told.status}
+        entry |= {"violation": told.violation, "optimality": told.optimality}
         if told.converged:
             cost = float(objective_values(self.problem, times, told.q[None])[0])
             solves = [*optimum.solves, {**entry, "cost": cost}]

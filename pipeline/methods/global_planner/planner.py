@@ -118,6 +118,8 @@ def by_differences(problem: Problem, options: GlobalOptions, context: Context) -
         return [_nothing(problem, Status.NOT_CONVERGED, why_not, log)]
     members = {id(fine): count for fine, count in found}
     ranked = basins(problem, problem.times, [fine for fine, _ in found], options.same_path).optima
+    count = f"{len(ranked)} distinct optim{'um' if len(ranked) == 1 else 'a'} found from {len(starts)} starts"
+    words = f"{count}; the last {coarse.barren} starts brought nothing new; "
     solutions = []
     for rank, fine in enumerate(ranked):
         own = {"starts_in_basin": members[id(fine)], "solves": fine.solves}
@@ -131,6 +133,7 @@ def by_differences(problem: Problem, options: GlobalOptions, context: Context) -
                 tracking_tolerance=TRACKING,
                 limits_kept=LIMIT_KINDS,
                 knots_only=options.refine_to is None,
+                evidence=(words if rank == 0 else "") + fine.evidence,
                 statistics={**(log if rank == 0 else {}), **own},
             )
         )
