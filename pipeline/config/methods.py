@@ -17,6 +17,7 @@ MethodName = Literal[
     "global",
     "pareto",
     "dynamic_programming",
+    "lower_bound",
     "calculus_of_variations",
     "pontryagin",
     "pontryagin_as_printed",
@@ -161,6 +162,18 @@ class DynamicProgrammingOptions:
 
 
 @schema
+class LowerBoundOptions:
+    """A bound from below on the cost of every motion on a grid's knots, by cells of the self-motion loops (r = 1)."""
+
+    intervals: Annotated[
+        Annotated[Whole, Field(ge=5, le=MOST_KNOTS)] | None,
+        Field(description="of the time grid; null: those of timing.steps"),
+    ] = 50
+    gap: Annotated[Number, Field(ge=1e-6, lt=1, description="relative, to the best motion found: where to stop")] = 1e-3
+    cells: Annotated[Whole, Field(ge=8, le=10_000, description="on the longest manifold, before any is halved")] = 120
+
+
+@schema
 class CalculusOfVariationsOptions:
     """Stationary motions of the kinetic-energy integral (r = 1, no limits)."""
 
@@ -230,6 +243,7 @@ class MethodConfig:
     global_: Annotated[GlobalOptions, Field(alias="global")] = GlobalOptions()
     pareto: ParetoOptions = ParetoOptions()
     dynamic_programming: DynamicProgrammingOptions = DynamicProgrammingOptions()
+    lower_bound: LowerBoundOptions = LowerBoundOptions()
     calculus_of_variations: CalculusOfVariationsOptions = CalculusOfVariationsOptions()
     pontryagin: PontryaginOptions = PontryaginOptions()
     pontryagin_as_printed: PontryaginAsPrintedOptions = PontryaginAsPrintedOptions()

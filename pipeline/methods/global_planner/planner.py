@@ -109,6 +109,23 @@ def solve(problem: Problem, options: GlobalOptions, context: Context) -> list[So
     return solutions
 
 
+def finish(
+    problem: Problem, times: Array, motions: Array, options: GlobalOptions, context: Context = Context()
+) -> list[Optimum]:
+    """The distinct optima on the problem's knots, best first, to which motions (S, N + 1, n) on the coarser knots
+    `times` lead; those that are lost on the way are left out.
+    """
+    why = Batch.without(problem, options)
+    batch = Batch(problem, options) if why is None else None
+    finer = [grid for grid in refinement(problem.times, len(times)) if len(grid) > len(times)]
+    grids = [times, *finer]
+    starts = _optimise_starts(problem, times, options, motions, batch, context)
+    basins = [starts[index] for index in _basins(problem, starts, options)]
+    refined = _refine_all(problem, grids, options, basins, batch, context)
+    good = [optimum for optimum in refined if optimum.converged and optimum.continuous]
+    return [good[index] for index in _distinct(good, options, problem)]
+
+
 def refuses(problem: Problem, options: GlobalOptions) -> str | None:
     """Starts by dynamic programming serve only what that method serves."""
     if "dynamic_programming" not in STARTS[options.starts]:
