@@ -146,7 +146,7 @@ class GlobalOptions:
 
 @schema
 class DynamicProgrammingOptions:
-    """Dynamic programming on a grid of the self-motion manifold (r = 1): a certificate for the global optimum."""
+    """Dynamic programming on a grid of the self-motion manifold (r = 1): an estimate of the best, and starts."""
 
     nodes: Annotated[Whole, Field(ge=8, le=10_000, description="on the longest manifold along the path")] = 360
     intervals: Annotated[

@@ -18,12 +18,13 @@ from typing import Any
 import numpy as np
 
 from pipeline.common.arrays import Array
-from pipeline.config.methods import DynamicProgrammingOptions, GlobalOptions
-from pipeline.methods.global_planner.optimum import first_order, optimise
+from pipeline.config.methods import DynamicProgrammingOptions
 from pipeline.methods.method import Context, Method, Serves
 from pipeline.model.kinematics import wrap
+from pipeline.problem.costs import objective_values
 from pipeline.problem.problem import Boundary, Problem
 from pipeline.problem.solution import Solution, Status, Trajectory
+from pipeline.program.transcription import transcribe
 from pipeline.search.grid import Grid, Index, make_grid
 from pipeline.search.selection import distinct
 
@@ -114,9 +115,11 @@ def _errors(problem: Problem, grid: Grid, motion: Array, cost: float) -> dict[st
     coarse_cost = best(coarse)
     drop, coarse_drop = best(grid.thin_nodes()) - cost, best(coarse.thin_nodes()) - coarse_cost
     interval_error = (coarse_cost - coarse_drop / 3) - (cost - drop / 3)
-    here = replace(first_order(problem), times=grid.times)
-    solved = optimise(here, grid.times, motion, GlobalOptions())
-    excess = cost - solved.cost if solved.converged else 0.0
+    free = np.full(problem.task.arm.n, np.inf)
+    bounds = replace(problem.bounds, torque=free, power=free)
+    relaxed = replace(problem, times=grid.times, limits=bounds, bounds_of_integrals={})
+    q, outcome, _ = transcribe(relaxed, grid.times, motion).solve()
+    excess = cost - float(objective_values(relaxed, grid.times, q[None])[0]) if outcome.converged else 0.0
     return {"grid_error": max(drop, excess), "interval_error": interval_error}
 
 

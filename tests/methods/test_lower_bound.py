@@ -43,8 +43,8 @@ def test_a_motion_its_cost_and_its_bound(line: Problem) -> None:
 
 def test_what_it_says() -> None:
     assert sentence(50, 0.0528942, 0.00139, 0.0528942) == (
-        "on 50 intervals no motion with joint steps below 2.5 rad costs more than 0.14 % less than this one does there, "
-        "0.052894; numerical bound"
+        "on 50 intervals no motion with joint steps below 2.5 rad costs more than 0.14 % less than this one does "
+        "there, 0.052894; numerical bound"
     )
     found = sentence(50, 0.025, 0.00139, 0.027)
     assert found.endswith("numerical bound; found where the bound showed room, the planner's starts led to 0.027")
