@@ -110,6 +110,13 @@ class GlobalOptions:
         Literal["newton", "ipopt"],
         Field(description="newton, confirmed by ipopt, where it serves the problem (the log says so); ipopt: alone"),
     ] = "newton"
+    transcription: Annotated[
+        Literal["differences", "spline"] | None,
+        Field(
+            description="differences: backward, as in the papers; spline: a smooth curve that keeps its limits between "
+            "the knots too; null: spline where boundary.rest, limits.acceleration or limits.jerk ask for it"
+        ),
+    ] = None
     nodes: Annotated[Whole, Field(ge=8, le=10_000, description="of the roadmap, in each layer")] = 300
     layers: Annotated[Whole, Field(ge=2, le=1000, description="of the roadmap, after the first")] = 6
     configurations: Annotated[
@@ -134,8 +141,18 @@ class GlobalOptions:
     ] = 0.01
     coarse_steps: Annotated[
         Annotated[Whole, Field(ge=2, le=MOST_KNOTS)] | None,
-        Field(description="intervals of the coarsest grid, at most; null: 25, and 12 where ipopt works alone"),
+        Field(
+            description="intervals of the coarsest grid, at most; null: 25, and 12 where ipopt works alone, or as many "
+            "as show the path's shape"
+        ),
     ] = None
+    refine_to: Annotated[
+        Annotated[Whole, Field(ge=2, le=MOST_KNOTS)] | None,
+        Field(
+            description="intervals up to which a grid is refined on which a motion would leave path.tolerance between "
+            "its knots; null: those of timing.steps are kept"
+        ),
+    ] = 2000
     tolerance: Tolerance = 1e-8
     max_iterations: Iterations = 300
     max_time: MaxTime = None

@@ -59,6 +59,7 @@ def solve(problem: Problem, options: DynamicProgrammingOptions, context: Context
             optimum=rank + 1,
             tracking_tolerance=TRACKING,
             knots_only=True,
+            grid="method.dynamic_programming.intervals",
             limits_kept=("position", "velocity", "clearance"),
             statistics={"cost": float(costs[index]), **(log if rank == 0 else {})},
         )
@@ -71,7 +72,7 @@ dynamic_programming = Method(
     "Dynamic programming",
     "#5A6472",
     DynamicProgrammingOptions,
-    Serves(redundancy=1, order=1, moving_base=False),
+    Serves(redundancy=1, order=1, moving_base=False, rest=False),
     solve,
 )
 

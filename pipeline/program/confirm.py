@@ -38,9 +38,11 @@ class Confirmation:
     moved: float
 
 
-def confirm(problem: Problem, times: Array, q: Array, *, tolerance: float, max_iterations: int) -> Confirmation:
-    """IPOPT's own answer from q (N + 1, n)."""
-    final, outcome, iterations = transcribe(problem, times, q).solve(
+def confirm(
+    problem: Problem, times: Array, q: Array, *, tolerance: float, max_iterations: int, keep_off: float = 0.0
+) -> Confirmation:
+    """IPOPT's own answer from q (N + 1, n); keep_off [m]: as in `transcribe`."""
+    final, outcome, iterations = transcribe(problem, times, q, keep_off=keep_off).solve(
         tolerance=tolerance, max_iterations=max_iterations, extra=HANDOVER
     )
     moved = float(np.abs(final - q).max())

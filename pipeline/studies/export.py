@@ -10,9 +10,9 @@ import numpy as np
 
 from pipeline.common.arrays import Array
 from pipeline.evaluation.between import audit
-from pipeline.evaluation.curve import curve, whole
 from pipeline.evaluation.evaluation import Evaluation
 from pipeline.evaluation.limits import LIMITS
+from pipeline.problem.curve import curve, whole
 from pipeline.problem.problem import Problem
 from pipeline.studies.study import Motions, Result
 
@@ -100,15 +100,15 @@ def chosen(motions: Motions) -> Evaluation | None:
 
 def resample(problem: Problem, evaluation: Evaluation, rate: float) -> Resampled:
     """The motion at `rate` [Hz], its last sample at exactly T."""
-    spline = curve(problem, evaluation.time, evaluation.q)
-    everything = whole(problem, evaluation.time, evaluation.solution.trajectory.q)
+    spline = curve(problem, evaluation.time, evaluation.q, evaluation.solution.trajectory.ends)
+    everything = whole(problem, evaluation.solution.trajectory)
     duration = float(evaluation.time[-1])
     time = np.append(np.arange(0.0, duration - 1e-9, 1.0 / rate), duration)
     q, qd, qdd = spline(time), spline(time, 1), spline(time, 2)
     knots = evaluation.time
     fine = np.interp(np.arange(BETWEEN * (len(knots) - 1) + 1) / BETWEEN, np.arange(len(knots)), knots)
     judged = np.union1d(time, fine)  # a slow rate must not hide what happens between its samples
-    checked = audit(problem, judged, everything(judged), everything(judged, 1), everything(judged, 2))
+    checked = audit(problem, judged, everything(judged), *(everything(judged, order) for order in (1, 2, 3)))
     names = problem.task.arm.description.joints
     worst = {kind: (float(judged[row]), names[joint]) for kind, (row, joint) in checked.worst.items()}
     return Resampled(

@@ -15,6 +15,7 @@ from pipeline.artifacts.scene import box, corners
 from pipeline.build.problem import prepare
 from pipeline.evaluation.base import BaseMotion
 from pipeline.run.run import run
+from tests.once import made_once
 from tests.support import FEW_STARTS, composed
 
 SMALL = (
@@ -26,11 +27,13 @@ SMALL = (
 )
 
 
-@pytest.fixture(scope="module")
+def run_small(folder: Path) -> None:
+    assert run(composed("+experiment=floating3r", *SMALL, "parallel.workers=1"), folder / "results") == 0
+
+
+@pytest.fixture(scope="session")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    made = tmp_path_factory.mktemp("floating")
-    assert run(composed("+experiment=floating3r", *SMALL, "parallel.workers=1"), made) == 0
-    return made
+    return made_once(tmp_path_factory, "floating", run_small) / "results"
 
 
 @pytest.mark.slow

@@ -16,7 +16,8 @@ from scipy.interpolate import CubicSpline
 from pipeline.build.problem import prepare
 from pipeline.config.methods import GlobalOptions, PmkeOptions
 from pipeline.config.run import check
-from pipeline.methods.global_planner.planner import STEPS, global_planner, refinement
+from pipeline.methods.global_planner.grids import refinement
+from pipeline.methods.global_planner.planner import STEPS, global_planner
 from pipeline.methods.pmke.predictive import pmke
 from pipeline.methods.pmke.window import Window
 from pipeline.problem.lagrangian import Lagrangian

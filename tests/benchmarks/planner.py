@@ -19,6 +19,7 @@ from pipeline.common.arrays import Array
 from pipeline.config.methods import GlobalOptions
 from pipeline.methods.global_planner import optimum, planner
 from pipeline.methods.global_planner.batch import Batch
+from pipeline.methods.global_planner.grids import refinement
 from pipeline.methods.global_planner.optimum import Optimum
 from pipeline.methods.method import Context
 from pipeline.problem.costs import objective_values
@@ -81,7 +82,7 @@ class Plan:
     def __init__(self, name: str, *words: str) -> None:
         config = composed(f"+experiment={name}", *words)
         self.problem, self.options = prepare(config), config.method.of("global")
-        self.grids = planner.refinement(self.problem.times, self.options.coarse_steps or planner.STEPS)
+        self.grids = refinement(self.problem.times, self.options.coarse_steps or planner.STEPS)
         begin = time.process_time()
         self.motions, _ = planner._starts(self.problem, self.grids[0], self.options, np.random.default_rng(config.seed))
         self.drawn = time.process_time() - begin

@@ -22,7 +22,7 @@ from pipeline.studies.export import Resampled, resample, sentence, study
 from pipeline.studies.study import Motions, Result
 from tests.support import composed
 
-FEW = GlobalOptions(candidates=60, optimised=2)
+FEW = GlobalOptions(candidates=60, optimised=2, refine_to=None)
 Case = tuple[Problem, Evaluation]
 
 

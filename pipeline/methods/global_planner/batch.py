@@ -15,6 +15,7 @@ from pipeline.config.methods import GlobalOptions
 from pipeline.methods.global_planner.optimum import (
     STAYS,
     Optimum,
+    clear_between,
     first_order,
     keeps_torque_limits,
     optimise,
@@ -59,7 +60,7 @@ class Batch:
                 break
             guesses = CubicSpline(on, np.array([optimum.q for _, optimum in going]), axis=1)(fine)
             found = _solve(newton, guesses, WARM)
-            lost = [k for k, optimum in enumerate(found) if not optimum.converged and newton.bounds]
+            lost = [k for k, optimum in enumerate(found) if not optimum.converged and newton.limits]
             for k, again in zip(lost, _solve(newton, guesses[lost], COLD), strict=True):
                 found[k] = replace(again, solves=found[k].solves + again.solves)
             for (k, before), finer in zip(going, found, strict=True):
@@ -78,15 +79,32 @@ class Batch:
         optimum = self._whether_continuous(times, optimum, STAYS) if optimum.continuous else optimum
         if not optimum.continuous:
             return optimum
-        options = self.options
-        told = confirm(self.first, times, optimum.q, tolerance=options.tolerance, max_iterations=options.max_iterations)
+        options, keep_off = self.options, 0.0
+        if self.first.obstacles is not None:
+            optimum, keep_off = clear_between(
+                self.first.task.arm,
+                self.first.obstacles,
+                times,
+                optimum,
+                lambda q, keep_off: _solve(self.solver.on(times, keep_off), q[None], WARM)[0],
+            )
+            if not optimum.converged:
+                return None
+        told = confirm(
+            self.first,
+            times,
+            optimum.q,
+            tolerance=options.tolerance,
+            max_iterations=options.max_iterations,
+            keep_off=keep_off,
+        )
         entry = {"solver": "ipopt", "intervals": len(times) - 1, "iterations": told.iterations, "moved": told.moved}
         entry |= {"wall_time_s": told.wall_time, "status": told.status}
         if told.converged:
             cost = float(objective_values(self.problem, times, told.q[None])[0])
             solves = [*optimum.solves, {**entry, "cost": cost}]
             return replace(optimum, q=told.q, cost=cost, status=told.status, solves=solves)
-        final = optimise(self.first, times, optimum.q, options)
+        final = optimise(self.first, times, optimum.q, options, keep_off)
         final = replace(final, solves=[*optimum.solves, {**entry, "cost": optimum.cost}, *final.solves])
         return self._whether_continuous(times, final, STAYS) if self._keeps(times, final) else None
 

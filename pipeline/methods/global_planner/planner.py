@@ -7,6 +7,7 @@ knots by cubic splines, halving the step. What is listed are the optima found fr
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -16,12 +17,15 @@ from pipeline.common.arrays import Array
 from pipeline.config.methods import GlobalOptions
 from pipeline.methods import dynamic_programming
 from pipeline.methods.global_planner.batch import Batch
+from pipeline.methods.global_planner.grids import coarsest, finer, on_knots, refinement
 from pipeline.methods.global_planner.optimum import Optimum, go_on, optimise_start, refine
 from pipeline.methods.global_planner.reasons import no_feasible, no_optimum, no_start
+from pipeline.methods.global_planner.smooth import rough, smooth, splined, unserved
 from pipeline.methods.method import ANY, Context, Method
 from pipeline.model.kinematics import wrap
 from pipeline.problem.limits import LIMIT_KINDS
 from pipeline.problem.problem import Problem
+from pipeline.problem.resolution import MOST
 from pipeline.problem.solution import Solution, Status, Trajectory
 from pipeline.program.feasibility import Relaxed, least_violation
 from pipeline.search.configurations import starting_points
@@ -57,8 +61,22 @@ HOPELESS = 0.1  # relative violation on a coarse grid from which on finer ones a
 
 def solve(problem: Problem, options: GlobalOptions, context: Context) -> list[Solution]:
     """The distinct optima found from these starts, best first."""
+    if not splined(problem, options):
+        return by_differences(problem, options, context)
+    found = by_differences(rough(problem), options, context)
+    if found[0].found:  # on the knots that the path needs
+        problem = replace(problem, times=found[0].trajectory.time)
+    return smooth(problem, found, options, context)
+
+
+def by_differences(problem: Problem, options: GlobalOptions, context: Context) -> list[Solution]:
+    """The same on the knots alone, as the papers have it."""
     why = Batch.without(problem, options)
-    grids = refinement(problem.times, options.coarse_steps or (STEPS if why is None else STEPS_ALONE))
+    times, too_coarse = on_knots(problem, options.refine_to)
+    if too_coarse:
+        return [_nothing(problem, Status.NOT_CONVERGED, too_coarse, {})]
+    asked, problem = len(problem.times) - 1, replace(problem, times=times)
+    grids = refinement(times, coarsest(problem, options.coarse_steps, STEPS if why is None else STEPS_ALONE))
     motions, log = _starts(problem, grids[0], options, np.random.default_rng(context.seed))
     if not len(motions):
         return [_nothing(problem, Status.INFEASIBLE, no_start(problem, log.get("drawn", 0)), log)]
@@ -80,14 +98,20 @@ def solve(problem: Problem, options: GlobalOptions, context: Context) -> list[So
             break
         # A coarse grid can be infeasible where a finer one is not: its finite differences are other numbers.
         motions, grids = CubicSpline(grids[0], motions[:FEWER], axis=1)(grids[1]), grids[1:]
-    log["grids"] = [len(grid) - 1 for grid in grids]
     log["starts"] = [
         {"converged": start.converged, "cost": start.cost, "status": start.status, "solves": start.solves}
         for start in starts
     ]
     basins = [starts[index] for index in _basins(problem, starts, options)]
     refined = _refine_all(problem, grids, options, basins, batch, context)
-    found = [(fine, coarse) for fine, coarse in zip(refined, basins, strict=True) if fine.converged and fine.continuous]
+    while (parted := finer(problem, options.refine_to, [fine.q for fine in refined if _good(fine)])) is not None:
+        problem, grids = replace(problem, times=parted), [*grids, parted]
+        again = [fine for fine in refined if _good(fine)]
+        batch = batch and Batch(problem, options)
+        newer = iter(_refine_all(problem, grids[-2:], options, again, batch, context))
+        refined = [next(newer) if _good(fine) else fine for fine in refined]
+    log["grids"] = [len(grid) - 1 for grid in grids]
+    found = [(fine, coarse) for fine, coarse in zip(refined, basins, strict=True) if _good(fine)]
     log["jumping_optima"] = sum(fine.converged and not fine.continuous for fine in refined)
     if not found:
         return [_nothing(problem, Status.NOT_CONVERGED, no_optimum(problem, grids[0], starts, refined), log)]
@@ -100,9 +124,11 @@ def solve(problem: Problem, options: GlobalOptions, context: Context) -> list[So
                 "global",
                 Trajectory(problem.times, fine.q),
                 Status.SOLVED,
+                _said(problem, asked, options, [fine.q for fine, _ in found]) if rank == 0 else "",
                 optimum=rank + 1,
                 tracking_tolerance=TRACKING,
                 limits_kept=LIMIT_KINDS,
+                knots_only=options.refine_to is None,
                 statistics={**(log if rank == 0 else {}), **members},
             )
         )
@@ -127,24 +153,28 @@ def finish(
 
 
 def refuses(problem: Problem, options: GlobalOptions) -> str | None:
-    """Starts by dynamic programming serve only what that method serves."""
+    """Starts by dynamic programming serve only what that method serves; differences know no rest."""
+    if why := unserved(problem, options):
+        return why
     if "dynamic_programming" not in STARTS[options.starts]:
         return None
-    why = dynamic_programming.dynamic_programming.why_not(problem)
+    why = dynamic_programming.dynamic_programming.why_not(rough(problem))
     return why and f"method.global.starts = {options.starts}: {why}; starts = roadmap serves every problem"
 
 
 global_planner = Method("global", "Global optimum", "#2F855A", GlobalOptions, ANY, solve, refuses)
 
 
-def refinement(times: Array, coarse_steps: int) -> list[Array]:
-    """Grids from coarse to fine: at most coarse_steps intervals, doubled until the wanted knots `times` are reached."""
-    intervals = len(times) - 1
-    sizes = [intervals]
-    while sizes[0] > coarse_steps:
-        sizes.insert(0, max(2, sizes[0] // 2))
-    place = np.arange(intervals + 1)
-    return [np.interp(np.linspace(0, intervals, size + 1), place, times) for size in sizes]
+def _good(optimum: Optimum) -> bool:
+    return optimum.converged and optimum.continuous
+
+
+def _said(problem: Problem, asked: int, options: GlobalOptions, motions: list[Array]) -> str:
+    """That the grid is not the one that was asked for, and not the one that would do."""
+    count = len(problem.times) - 1
+    said = f"on {count} intervals: the {asked} of timing.steps are too few for path.tolerance" * (count > asked)
+    more = options.refine_to is not None and finer(problem, MOST, motions) is not None
+    return "; ".join(filter(None, [said, f"method.global.refine_to = {options.refine_to} allows no more" * more]))
 
 
 def _starts(
@@ -155,9 +185,6 @@ def _starts(
     log: dict[str, Any] = {}
     revolute = problem.task.arm.description.revolute
     wanted = STARTS[options.starts]
-    if "roadmap" in wanted and problem.task.arm.base.count:
-        wanted = ("population",)
-        log["roadmap"] = "not for a base that moves or is held: population instead"
     if "roadmap" in wanted:
         paths = Roadmap(options.nodes, options.layers, options.optimised).starts(problem, coarse, rng)
         log["roadmap_paths"] = len(paths)

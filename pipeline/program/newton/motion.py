@@ -9,7 +9,7 @@ M/dt at its beginning, and -P - M/dt between the two.
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
-from typing import Any, Self
+from typing import Any, Protocol, Self
 
 import numpy as np
 
@@ -20,7 +20,8 @@ from pipeline.model.kernel.rows import TaskRows
 from pipeline.model.task import Task
 from pipeline.problem.objective import Objective
 from pipeline.program.newton import triangular
-from pipeline.program.newton.knots import Knots
+from pipeline.program.newton.knots import Blocks, Knots
+from pipeline.program.newton.stencils import By
 
 
 class PerStart:
@@ -44,28 +45,65 @@ def _each(value: Any, change: Any) -> Any:
 
 @dataclass
 class Point(PerStart):
-    """At unknowns x (S, U, n): cost (S,), gradient (S, U, n), Hessian blocks diagonal, off and those of the stiffness
-    M/dt alone, error (S, U, m); J' = Y R with null space Z; columns for the curvature of the path (`rows.py`).
+    """At unknowns x (S, U, n): cost (S,), gradient (S, U, n), blocks of the Hessian and of the stiffness M/dt alone,
+    error (S, U, m); J' = Y R with null space Z; columns for the curvature of the path (`rows.py`); kept (S, U, R), what
+    must not be negative (`Rows`), and its derivatives by (`stencils.py`).
     """
 
     cost: Array
     gradient: Array
-    diagonal: Array
-    off: Array
-    stiff: Array
-    stiff_off: Array
+    hessian: Blocks
+    stiff: Blocks
     error: Array
     Y: Array
     Z: Array
     R: Array
     columns: tuple[Array, ...]
+    kept: Array
+    by: By
+
+
+class Rows(Protocol):
+    """Inequalities c(x) >= 0, `count` (R) for each knot, which know of `reach` unknowns before its own."""
+
+    count: int
+    reach: int
+
+    def values(self, x: Array, begin: Array) -> Array:
+        """c (S, U, R)."""
+
+    def differentiate(self, x: Array, begin: Array) -> tuple[Array, By]:
+        """c and its derivatives."""
+
+    def curvature(self, x: Array, begin: Array, z: Array) -> Blocks:
+        """Blocks of the sum of -z (S, U, R) times the second derivatives of c."""
+
+
+class Nothing:
+    """No such rows."""
+
+    count = reach = 0
+
+    def values(self, x: Array, begin: Array) -> Array:
+        return np.empty((*x.shape[:2], 0))
+
+    def differentiate(self, x: Array, begin: Array) -> tuple[Array, By]:
+        return self.values(x, begin), ()
+
+    def curvature(self, x: Array, begin: Array, z: Array) -> Blocks:
+        return ()
+
+
+NOTHING = Nothing()
 
 
 class Motions:
-    """Motions of one task on one grid."""
+    """Motions of one task on one grid, and what they must keep besides (`kept`)."""
 
-    def __init__(self, chain: Chain, task: Task, objective: Objective, knots: Knots, x_ref: Array) -> None:
-        self.chain, self.knots, self.rows = chain, knots, TaskRows(chain, task)
+    def __init__(
+        self, chain: Chain, task: Task, objective: Objective, knots: Knots, x_ref: Array, kept: Rows = NOTHING
+    ) -> None:
+        self.chain, self.knots, self.rows, self.kept = chain, knots, TaskRows(chain, task), kept
         self.n, self.m = chain.n, task.m
         self.inertia, self.norm = objective.weight("kinetic_energy"), objective.weight("velocity_norm")
         self.target = x_ref[knots.first : knots.first + knots.count]
@@ -75,15 +113,16 @@ class Motions:
         qd = self.knots.steps(x, begin) / self.knots.dt[:, None]
         return x.reshape(-1, self.n), qd.reshape(-1, self.n), np.tile(self.target, (len(x), 1))
 
-    def value(self, x: Array, begin: Array) -> tuple[Array, Array]:
-        """Cost (S,), path error (S, U, m)."""
+    def value(self, x: Array, begin: Array) -> tuple[Array, Array, Array]:
+        """Cost (S,), path error (S, U, m), what is kept (S, U, R)."""
         q, qd, target = self._flat(x, begin)
         at = self.chain.places(q)
         value = self.norm * (qd * qd).sum(axis=1)
         if self.inertia:
             value = value + self.inertia * energy(self.chain, q, qd, second=False, at=at).value
         error = self.rows.error(at, target)
-        return value.reshape(len(x), -1) @ self.knots.weight, error.reshape(len(x), -1, self.m)
+        cost = value.reshape(len(x), -1) @ self.knots.weight
+        return cost, error.reshape(len(x), -1, self.m), self.kept.values(x, begin)
 
     def differentiate(self, x: Array, begin: Array) -> Point:
         """Everything at x (S, U, n)."""
@@ -99,18 +138,20 @@ class Motions:
         found = self.rows.evaluate(at, target)
         R, Q_of_rows = triangular.split(np.ascontiguousarray(found.jacobian.transpose(2, 1, 0)))
         basis = np.ascontiguousarray(Q_of_rows.transpose(2, 0, 1)).reshape(S, U, n, n)
+        kept, by = self.kept.differentiate(x, begin)
+        curved = knots.spread(weight[:, :, None] * Q + P + P.swapaxes(-1, -2) + stiff, stiff)
         return Point(
             cost=value.reshape(S, U) @ knots.weight,
             gradient=knots.spread(weight * by_q + owns[:, None] * by_qd, -owns[:, None] * by_qd),
-            diagonal=knots.spread(weight[:, :, None] * Q + P + P.swapaxes(-1, -2) + stiff, stiff),
-            off=knots.between(-P - stiff),
-            stiff=knots.spread(stiff, stiff),
-            stiff_off=knots.between(-stiff),
+            hessian=(curved, knots.between(-P - stiff)),
+            stiff=(knots.spread(stiff, stiff), knots.between(-stiff)),
             error=found.error.reshape(S, U, self.m),
             Y=basis[..., : self.m],
             Z=basis[..., self.m :],
             R=np.ascontiguousarray(R.transpose(2, 0, 1)).reshape(S, U, self.m, self.m),
             columns=tuple(a.reshape(S, U, n, 3) for a in found.columns),
+            kept=kept,
+            by=by,
         )
 
     def _lagrangian(self, q: Array, qd: Array, at: Places) -> tuple[Array, ...]:
@@ -122,6 +163,15 @@ class Motions:
         value, by_q, by_qd, M, P, Q = (self.inertia * part for part in parts)
         value, by_qd = value + self.norm * (qd * qd).sum(axis=1), by_qd + 2 * self.norm * qd
         return value, by_q, by_qd, M + 2 * self.norm * np.eye(self.n), P, Q
+
+    @property
+    def reach(self) -> int:
+        """How far apart unknowns are that know of each other."""
+        return max(1, self.kept.reach)
+
+    def bent(self, x: Array, begin: Array, z: Array) -> Blocks:
+        """What the rows' curvature adds to the Hessian, by their multipliers z (S, U, R)."""
+        return self.kept.curvature(x, begin, z)
 
     def curvature(self, point: Point, multipliers: Array) -> Array:
         """multipliers (S, U, m) . d2x/dq2: (S, U, n, n)."""

@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.common.arrays import Array
+from pipeline.model.clearance import Clearance
 from pipeline.model.kernel.chain import Chain
 from pipeline.problem.problem import Problem
+from pipeline.program.newton.clear import Clear
 from pipeline.program.newton.knots import Knots
-from pipeline.program.newton.motion import Motions
+from pipeline.program.newton.motion import Motions, Nothing
 from pipeline.program.newton.newton import Newton
 
 FEWEST = 4  # intervals: a shorter cycle does not fold
@@ -29,7 +31,6 @@ def why_not(problem: Problem) -> str | None:
         and not objective.weight("velocity_norm"),
         "bounds on integrals": bool(problem.bounds_of_integrals),
         "torque or power limits": bool(np.isfinite(bounds.torque).any() or np.isfinite(bounds.power).any()),
-        "obstacles": problem.obstacles is not None,
         "so few intervals": len(problem.times) <= FEWEST,
     }
     return next((reason for reason, holds in reasons.items() if holds), None)
@@ -40,9 +41,12 @@ class Solver:
 
     def __init__(self, problem: Problem) -> None:
         self.problem, self.chain = problem, Chain.of(problem.task.arm)
+        obstacles = problem.obstacles
+        self.clearance = None if obstacles is None else Clearance(problem.task.arm, obstacles)
 
-    def on(self, times: Array) -> Newton:
-        """For motions on the knots `times` (N + 1,)."""
+    def on(self, times: Array, keep_off: float = 0.0) -> Newton:
+        """For motions on the knots `times` (N + 1,), by keep_off [m] more than the margin off all obstacles."""
         problem, knots = self.problem, Knots(self.problem.boundary, times)
         x_ref = problem.reference.position(times)
-        return Newton(Motions(self.chain, problem.task, problem.objective, knots, x_ref), problem.bounds)
+        kept = Nothing() if self.clearance is None else Clear(self.clearance.rows(keep_off))
+        return Newton(Motions(self.chain, problem.task, problem.objective, knots, x_ref, kept), problem.bounds)
