@@ -73,11 +73,11 @@ def solve(problem: Problem, options: LowerBoundOptions, context: Context) -> lis
     log: dict[str, Any] = {"intervals": intervals, "cost": best.cost, "bound": bound, "gap": gap}
     log |= {"cost_from_roadmap": first.cost, "rounds": rounds}
     context.progress(1, 1, best.cost)
-    finished = finish(problem, times, best.q[None], GlobalOptions(), context)
+    knots, finished = finish(problem, times, best.q[None], GlobalOptions(), context)
     return [
         Solution(
             "lower_bound",
-            Trajectory(problem.times, finished[0].q) if finished else Trajectory(times, best.q),
+            Trajectory(knots, finished[0].q) if finished else Trajectory(times, best.q),
             Status.SOLVED,
             sentence(intervals, best.cost, gap, first.cost),
             tracking_tolerance=TRACKING,
@@ -107,8 +107,8 @@ def percent(gap: float) -> str:
 
 
 def refuses(problem: Problem, options: LowerBoundOptions) -> str | None:
-    """What Newton's method does not serve has no motion to hold a bound against."""
-    why = serve.why_not(problem)
+    """What Newton's method does not serve has no motion to hold a bound against; and cells know no obstacles."""
+    why = "obstacles" if problem.obstacles is not None else serve.why_not(problem)
     return why and f"the problem has {why}; supported are limits of positions and velocities, and no other conditions"
 
 
@@ -117,7 +117,7 @@ lower_bound = Method(
     "Best under a bound",
     "#7A5C9E",
     LowerBoundOptions,
-    Serves(redundancy=1, order=1, moving_base=False),
+    Serves(redundancy=1, order=1, moving_base=False, rest=False),
     solve,
     refuses,
 )

@@ -7,7 +7,7 @@ it is, is a question of paths and not of costs. What the planner does not list s
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -111,11 +111,12 @@ def compare(
     context: Context,
 ) -> Comparison:
     """Of the planner's solutions and another method's, best first and all on the same knots, which may be coarser."""
-    times, knots = on_grid[0].trajectory.time, problem.times
+    times, knots = on_grid[0].trajectory.time, planned[0].trajectory.time
+    problem, options = replace(problem, times=knots), replace(options, refine_to=None)
     optima = np.array([solution.trajectory.q for solution in planned])
     costs = objective_values(problem, knots, optima)
     first, all_finished = (
-        finish(problem, times, np.array([s.trajectory.q for s in some]), options, context)
+        finish(problem, times, np.array([s.trajectory.q for s in some]), options, context)[1]
         for some in (on_grid[:1], on_grid)
     )
     cheaper = [

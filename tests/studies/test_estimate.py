@@ -90,7 +90,7 @@ def test_a_dearer_motion_of_another_path_is_only_named(line: Problem, optima: li
 def test_a_motion_that_is_lost_says_so(
     line: Problem, optima: list[Solution], on_grid: list[Solution], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(estimate, "finish", lambda *arguments: [])
+    monkeypatch.setattr(estimate, "finish", lambda *arguments: (line.times, []))
     made = compared(line, optima, on_grid)
     assert np.isnan(made.finished)
     assert "was lost on the way to 26" in made.sentence

@@ -103,13 +103,7 @@ def by_differences(problem: Problem, options: GlobalOptions, context: Context) -
         for start in starts
     ]
     basins = [starts[index] for index in _basins(problem, starts, options)]
-    refined = _refine_all(problem, grids, options, basins, batch, context)
-    while (parted := finer(problem, options.refine_to, [fine.q for fine in refined if _good(fine)])) is not None:
-        problem, grids = replace(problem, times=parted), [*grids, parted]
-        again = [fine for fine in refined if _good(fine)]
-        batch = batch and Batch(problem, options)
-        newer = iter(_refine_all(problem, grids[-2:], options, again, batch, context))
-        refined = [next(newer) if _good(fine) else fine for fine in refined]
+    problem, grids, refined = _to_the_end(problem, grids, options, basins, batch, context)
     log["grids"] = [len(grid) - 1 for grid in grids]
     found = [(fine, coarse) for fine, coarse in zip(refined, basins, strict=True) if _good(fine)]
     log["jumping_optima"] = sum(fine.converged and not fine.continuous for fine in refined)
@@ -136,20 +130,22 @@ def by_differences(problem: Problem, options: GlobalOptions, context: Context) -
 
 
 def finish(
-    problem: Problem, times: Array, motions: Array, options: GlobalOptions, context: Context = Context()
-) -> list[Optimum]:
-    """The distinct optima on the problem's knots, best first, to which motions (S, N + 1, n) on the coarser knots
-    `times` lead; those that are lost on the way are left out.
+    problem: Problem, times: Array, motions: Array, options: GlobalOptions, context: Context
+) -> tuple[Array, list[Optimum]]:
+    """The distinct optima, best first, to which motions (S, N + 1, n) on the knots `times` lead, and the knots that
+    they are on: the problem's, or those that its path needs. Motions that are lost on the way are left out.
     """
-    why = Batch.without(problem, options)
-    batch = Batch(problem, options) if why is None else None
-    finer = [grid for grid in refinement(problem.times, len(times)) if len(grid) > len(times)]
-    grids = [times, *finer]
+    knots, too_coarse = on_knots(problem, options.refine_to)
+    if too_coarse:
+        return knots, []
+    problem = replace(problem, times=knots)
+    batch = Batch(problem, options) if Batch.without(problem, options) is None else None
+    grids = [times, *(grid for grid in refinement(knots, len(times)) if len(grid) > len(times))]
     starts = _optimise_starts(problem, times, options, motions, batch, context)
     basins = [starts[index] for index in _basins(problem, starts, options)]
-    refined = _refine_all(problem, grids, options, basins, batch, context)
-    good = [optimum for optimum in refined if optimum.converged and optimum.continuous]
-    return [good[index] for index in _distinct(good, options, problem)]
+    problem, _, refined = _to_the_end(problem, grids, options, basins, batch, context)
+    good = [optimum for optimum in refined if _good(optimum)]
+    return problem.times, [good[index] for index in _distinct(good, options, problem)]
 
 
 def refuses(problem: Problem, options: GlobalOptions) -> str | None:
@@ -254,6 +250,27 @@ def _refine_all(
     left = [basin for basin, optimum in zip(basins, refined, strict=True) if optimum is None]
     others = iter(context.workers.map(refine, (problem, grids, options), left))
     return [next(others) if optimum is None else optimum for optimum in refined]
+
+
+def _to_the_end(
+    problem: Problem,
+    grids: list[Array],
+    options: GlobalOptions,
+    basins: list[Optimum],
+    batch: Batch | None,
+    context: Context,
+) -> tuple[Problem, list[Array], list[Optimum]]:
+    """Every basin on the last grid, and on finer ones while a motion leaves its path between knots; the problem is then
+    the one on these.
+    """
+    refined = _refine_all(problem, grids, options, basins, batch, context)
+    while (parted := finer(problem, options.refine_to, [fine.q for fine in refined if _good(fine)])) is not None:
+        problem, grids = replace(problem, times=parted), [*grids, parted]
+        again = [fine for fine in refined if _good(fine)]
+        batch = batch and Batch(problem, options)
+        newer = iter(_refine_all(problem, grids[-2:], options, again, batch, context))
+        refined = [next(newer) if _good(fine) else fine for fine in refined]
+    return problem, grids, refined
 
 
 def _basins(problem: Problem, starts: list[Optimum], options: GlobalOptions) -> list[int]:
