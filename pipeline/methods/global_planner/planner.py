@@ -158,7 +158,7 @@ def refuses(problem: Problem, options: GlobalOptions) -> str | None:
     return why and f"method.global.starts = {options.starts}: {why}; starts = roadmap serves every problem"
 
 
-global_planner = Method("global", "Global optimum", "#2F855A", GlobalOptions, ANY, solve, refuses)
+global_planner = Method("global", "Planner's optimum", "#2F855A", GlobalOptions, ANY, solve, refuses)
 
 
 def _good(optimum: Optimum) -> bool:
