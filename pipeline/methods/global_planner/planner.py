@@ -102,16 +102,9 @@ def by_differences(problem: Problem, options: GlobalOptions, context: Context) -
         for start in starts
     ]
     log["barren_starts"] = coarse.barren
-    refined = _refine_all(problem, grids, options, coarse.optima, batch, context)
-    while (parted := finer(problem, options.refine_to, [fine.q for fine in refined if _good(fine)])) is not None:
-        problem, grids = replace(problem, times=parted), [*grids, parted]
-        again = [fine for fine in refined if _good(fine)]
-        batch = batch and Batch(problem, options)
-        newer = iter(_refine_all(problem, grids[-2:], options, again, batch, context))
-        refined = [next(newer) if _good(fine) else fine for fine in refined]
+    problem, grids, refined = _to_the_end(problem, grids, options, coarse.optima, batch, context)
     log["grids"] = [len(grid) - 1 for grid in grids]
-    pairs = zip(refined, coarse.members, strict=True)
-    found = [(fine, members) for fine, members in pairs if _good(fine)]
+    found = [(fine, members) for fine, members in zip(refined, coarse.members, strict=True) if _good(fine)]
     log["jumping_optima"] = coarse.jumping + sum(fine.converged and not fine.continuous for fine in refined)
     if not found:
         why_not = no_optimum(problem, grids[0], starts, refined, coarse.jumping)
@@ -140,6 +133,25 @@ def by_differences(problem: Problem, options: GlobalOptions, context: Context) -
     return solutions
 
 
+def finish(
+    problem: Problem, times: Array, motions: Array, options: GlobalOptions, context: Context
+) -> tuple[Array, list[Optimum]]:
+    """The distinct optima, best first, to which motions (S, N + 1, n) on the knots `times` lead, and the knots that
+    they are on: the problem's, or those that its path needs. Motions that are lost on the way are left out.
+    """
+    knots, too_coarse = on_knots(problem, options.refine_to)
+    if too_coarse:
+        return knots, []
+    problem = replace(problem, times=knots)
+    batch = Batch(problem, options) if Batch.without(problem, options) is None else None
+    grids = [times, *(grid for grid in refinement(knots, len(times)) if len(grid) > len(times))]
+    starts = _optimise_starts(problem, times, options, motions, batch, context)
+    chosen = basins(problem, times, starts, options.same_path).optima
+    problem, _, refined = _to_the_end(problem, grids, options, chosen, batch, context)
+    good = [optimum for optimum in refined if _good(optimum)]
+    return problem.times, basins(problem, problem.times, good, options.same_path).optima
+
+
 def refuses(problem: Problem, options: GlobalOptions) -> str | None:
     """Starts by dynamic programming serve only what that method serves; differences know no rest."""
     if why := unserved(problem, options):
@@ -150,7 +162,7 @@ def refuses(problem: Problem, options: GlobalOptions) -> str | None:
     return why and f"method.global.starts = {words}: {why}; starts = roadmap serves every problem"
 
 
-global_planner = Method("global", "Global optimum", "#2F855A", GlobalOptions, ANY, solve, refuses)
+global_planner = Method("global", "Planner's optimum", "#2F855A", GlobalOptions, ANY, solve, refuses)
 
 
 def _good(optimum: Optimum) -> bool:
@@ -234,15 +246,36 @@ def _refine_all(
     problem: Problem,
     grids: list[Array],
     options: GlobalOptions,
-    basins: list[Optimum],
+    optima: list[Optimum],
     batch: Batch | None,
     context: Context,
 ) -> list[Optimum]:
-    """Every basin on the last grid: in one batch, and those that it does not finish one by one."""
-    refined = [None] * len(basins) if batch is None else batch.refine(grids, basins)
-    left = [basin for basin, optimum in zip(basins, refined, strict=True) if optimum is None]
+    """Every optimum on the last grid: in one batch, and those that it does not finish one by one."""
+    refined = [None] * len(optima) if batch is None else batch.refine(grids, optima)
+    left = [before for before, optimum in zip(optima, refined, strict=True) if optimum is None]
     others = iter(context.workers.map(refine, (problem, grids, options), left))
     return [next(others) if optimum is None else optimum for optimum in refined]
+
+
+def _to_the_end(
+    problem: Problem,
+    grids: list[Array],
+    options: GlobalOptions,
+    optima: list[Optimum],
+    batch: Batch | None,
+    context: Context,
+) -> tuple[Problem, list[Array], list[Optimum]]:
+    """Every optimum on the last grid, and on finer ones while a motion leaves its path between knots; the problem is
+    then the one on these.
+    """
+    refined = _refine_all(problem, grids, options, optima, batch, context)
+    while (parted := finer(problem, options.refine_to, [fine.q for fine in refined if _good(fine)])) is not None:
+        problem, grids = replace(problem, times=parted), [*grids, parted]
+        again = [fine for fine in refined if _good(fine)]
+        batch = batch and Batch(problem, options)
+        newer = iter(_refine_all(problem, grids[-2:], options, again, batch, context))
+        refined = [next(newer) if _good(fine) else fine for fine in refined]
+    return problem, grids, refined
 
 
 def _nothing(problem: Problem, status: Status, message: str, log: dict[str, Any]) -> Solution:
