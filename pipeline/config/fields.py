@@ -80,6 +80,7 @@ Vector = Annotated[Numbers, Field(min_length=3, max_length=3)]
 Words = Annotated[tuple[T, ...], Field(min_length=1), AfterValidator(once)]
 # One for all (joints, axes), or a list.
 OneOrList = Annotated[Annotated[T, Tag("number")] | Annotated[tuple[T, ...], Tag("array")], Discriminator(_kind)]
+WordOrWords = Annotated[Annotated[T, Tag("string")] | Annotated[Words[T], Tag("array")], Discriminator(_kind)]
 WordOrVector = Annotated[Annotated[T, Tag("string")] | Annotated[Vector, Tag("array")], Discriminator(_kind)]
 
 

@@ -221,7 +221,7 @@ def solved(*words: str) -> tuple[Problem, Newton, Array]:
     return (
         problem,
         Solver(problem).on(problem.times),
-        Roadmap().starts(problem, problem.times, np.random.default_rng(1)),
+        Roadmap(problem, problem.times, np.random.default_rng(1)).cheapest(64),
     )
 
 
@@ -242,7 +242,7 @@ def test_ipopt_confirms_every_optimum(name: str) -> None:
 def test_ipopt_confirms_an_optimum_beside_an_obstacle() -> None:
     """Without the rows' curvature the last digits of the multipliers are IPOPT's to find."""
     problem = prepare(composed("+experiment=panda_obstacle", "timing.steps=12"))
-    starts = Roadmap(nodes=60, most=4).starts(problem, problem.times, np.random.default_rng(1))
+    starts = Roadmap(problem, problem.times, np.random.default_rng(1), nodes=60).cheapest(4)
     answer = Solver(problem).on(problem.times).solve(starts)
     assert answer.converged.sum() >= 2
     q = answer.q[np.flatnonzero(answer.converged)[np.argmin(answer.cost[answer.converged])]]
@@ -259,7 +259,7 @@ def test_ipopt_confirms_an_optimum_beside_an_obstacle() -> None:
 def test_ipopt_confirms_optima_of_torques(name: str) -> None:
     """Squares of torques, and in sim4 limits of torques and powers that matter."""
     problem = prepare(composed(f"+experiment={name}", "timing.steps=25"))
-    starts = Roadmap(nodes=100, most=4).starts(problem, problem.times, np.random.default_rng(1))
+    starts = Roadmap(problem, problem.times, np.random.default_rng(1), nodes=100).cheapest(4)
     answer = Solver(problem).on(problem.times).solve(starts)
     assert answer.converged.any()
     q = answer.q[np.flatnonzero(answer.converged)[np.argmin(answer.cost[answer.converged])]]
