@@ -79,6 +79,8 @@ def _moved(problem: Problem, base: Base) -> Problem:
         padded(own.torque),
         padded(own.power),
         own.attitude,
+        padded(np.broadcast_to(own.acceleration, fixed.n)),
+        padded(np.broadcast_to(own.jerk, fixed.n)),
     )
     q_init = np.concatenate([np.zeros(base.count), problem.q_init])
     return replace(problem, task=replace(problem.task, arm=arm), q_init=q_init, limits=limits)

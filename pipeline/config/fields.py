@@ -56,7 +56,8 @@ def as_name(text: str) -> str:
     return text
 
 
-def _once(words: tuple[T, ...]) -> tuple[T, ...]:
+def once(words: tuple[T, ...]) -> tuple[T, ...]:
+    """Words of which each stands once; raises ValueError."""
     if len(set(words)) != len(words):
         raise ValueError("a word stands twice")
     return words
@@ -78,7 +79,7 @@ Name = Annotated[str, BeforeValidator(_text), AfterValidator(as_name)]
 Text = Annotated[str, BeforeValidator(_text)]
 Numbers = tuple[Number, ...]
 Vector = Annotated[Numbers, Field(min_length=3, max_length=3)]
-Words = Annotated[tuple[T, ...], Field(min_length=1), AfterValidator(_once)]
+Words = Annotated[tuple[T, ...], Field(min_length=1), AfterValidator(once)]
 # One for all (joints, axes), or a list.
 OneOrList = Annotated[Annotated[T, Tag("number")] | Annotated[tuple[T, ...], Tag("array")], Discriminator(_kind)]
 WordOrVector = Annotated[Annotated[T, Tag("string")] | Annotated[Vector, Tag("array")], Discriminator(_kind)]

@@ -109,6 +109,13 @@ class GlobalOptions:
         Literal["newton", "ipopt"],
         Field(description="newton, confirmed by ipopt, where it serves the problem (the log says so); ipopt: alone"),
     ] = "newton"
+    transcription: Annotated[
+        Literal["differences", "spline"] | None,
+        Field(
+            description="differences: backward, as in the papers; spline: a smooth curve that keeps its limits between "
+            "the knots too; null: spline where boundary.rest, limits.acceleration or limits.jerk ask for it"
+        ),
+    ] = None
     nodes: Annotated[Whole, Field(ge=8, le=10_000, description="of the roadmap, in each layer")] = 300
     layers: Annotated[Whole, Field(ge=2, le=1000, description="of the roadmap, after the first")] = 6
     configurations: Annotated[

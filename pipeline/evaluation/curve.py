@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.common.arrays import Array
 from pipeline.evaluation.plant import SinglePlant
 from pipeline.problem.curve import whole
 from pipeline.problem.problem import Problem
+from pipeline.problem.solution import Trajectory
 
 INNER = 4  # sub-intervals per knot interval at which the curve is held against its path
 
@@ -23,12 +23,13 @@ class OffPath:
     when: tuple[float, float]
 
 
-def off_path(problem: Problem, plant: SinglePlant, time: Array, q: Array) -> OffPath:
-    """How far the curve through the knots q (N + 1, n) is from its path; nan where it has none."""
+def off_path(problem: Problem, plant: SinglePlant, trajectory: Trajectory) -> OffPath:
+    """How far the curve of a trajectory is from its path; nan where it has none."""
+    time, q = trajectory.time, trajectory.q
     if not np.all(np.isfinite(q)):
         return OffPath(np.nan, np.nan, (np.nan, np.nan))
     moments = np.interp(np.arange(INNER * (len(time) - 1) + 1) / INNER, np.arange(len(time)), time)
-    motion, targets = whole(problem, time, q)(moments), problem.reference.position(moments)
+    motion, targets = whole(problem, trajectory)(moments), problem.reference.position(moments)
     error = np.empty((len(moments), 2))
     for i in range(len(moments)):
         plant.at(motion[i], np.zeros_like(motion[i]))

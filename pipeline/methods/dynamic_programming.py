@@ -68,7 +68,7 @@ dynamic_programming = Method(
     "Dynamic programming",
     "#5A6472",
     DynamicProgrammingOptions,
-    Serves(redundancy=1, order=1, moving_base=False),
+    Serves(redundancy=1, order=1, moving_base=False, rest=False),
     solve,
 )
 

@@ -21,7 +21,7 @@ from pipeline.config.methods import ParetoOptions
 from pipeline.methods.global_planner.grids import finer
 from pipeline.methods.global_planner.optimum import stays_on_path
 from pipeline.methods.global_planner.planner import TRACKING, global_planner
-from pipeline.methods.method import ANY, Context, Method
+from pipeline.methods.method import ON_KNOTS, Context, Method
 from pipeline.problem.costs import integrals
 from pipeline.problem.limits import LIMIT_KINDS
 from pipeline.problem.objective import Objective
@@ -131,7 +131,7 @@ def refuses(problem: Problem, options: ParetoOptions) -> str | None:
     return next((why for own in each if (why := global_planner.why_not(own, options.planner))), None)
 
 
-pareto = Method("pareto", "Pareto point", "#2F855A", ParetoOptions, ANY, solve, refuses)
+pareto = Method("pareto", "Pareto point", "#2F855A", ParetoOptions, ON_KNOTS, solve, refuses)
 
 
 def _points(options: ParetoOptions, best: Array, worst: Array) -> list[Point]:

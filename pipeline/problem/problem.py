@@ -36,6 +36,7 @@ class Problem:
     times: (N + 1,) [s] the knots of the grid on which a global solution is wanted.
     bounds_of_integrals: upper bounds by the names in the catalogue (`integrals.py`), positive; an infinite one is none.
     qd_init: (n,) [rad/s] the velocity that a motion from q_init comes with; None: at rest, or as the path is entered.
+    rest: whether all joints rest at the start, at the end. zero_acceleration: whether they do not accelerate there.
     """
 
     task: Task
@@ -48,6 +49,8 @@ class Problem:
     bounds_of_integrals: Mapping[str, float] = field(default_factory=dict)
     obstacles: Obstacles | None = None
     qd_init: Array | None = None
+    rest: tuple[bool, bool] = (False, False)
+    zero_acceleration: bool = False
 
     def __post_init__(self) -> None:
         for name, bound in self.bounds_of_integrals.items():

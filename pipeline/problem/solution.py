@@ -31,10 +31,15 @@ class Status(enum.Enum):
 
 @dataclass(frozen=True)
 class Trajectory:
-    """A joint motion: time (N + 1,) [s], q (N + 1, n) [rad]. Everything else is computed from these two."""
+    """A joint motion: time (N + 1,) [s], q (N + 1, n) [rad]. Everything else is computed from these.
+
+    ends: (2, n) [rad/s] the velocities at both ends of a motion that is a spline, the C2 cubic one through its knots;
+    None: of what is known at its knots alone.
+    """
 
     time: Array
     q: Array
+    ends: Array | None = None
 
 
 @dataclass(frozen=True)

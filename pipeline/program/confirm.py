@@ -23,6 +23,8 @@ HANDOVER = {
     "slack_bound_push": 1e-14,
     "slack_bound_frac": 1e-14,
     "nlp_scaling_method": "none",
+    "constr_mult_init_max": 1e8,  # else the first multipliers of long rows are put to zero
+    "acceptable_iter": 3,  # where rounding keeps IPOPT from its last digits, at an optimum it cannot gain any
 }
 
 
@@ -38,9 +40,11 @@ class Confirmation:
     moved: float
 
 
-def confirm(problem: Problem, times: Array, q: Array, *, tolerance: float, max_iterations: int) -> Confirmation:
-    """IPOPT's own answer from q (N + 1, n)."""
-    final, outcome, iterations = transcribe(problem, times, q).solve(
+def confirm(
+    problem: Problem, times: Array, q: Array, *, tolerance: float, max_iterations: int, keep_off: float = 0.0
+) -> Confirmation:
+    """IPOPT's own answer from q (N + 1, n); keep_off [m]: as in `transcribe`."""
+    final, outcome, iterations = transcribe(problem, times, q, keep_off=keep_off).solve(
         tolerance=tolerance, max_iterations=max_iterations, extra=HANDOVER
     )
     moved = float(np.abs(final - q).max())

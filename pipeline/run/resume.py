@@ -28,6 +28,8 @@ def inputs(config: RunConfig) -> dict[str, str]:
     files |= {f"robot.urdf: {name}": file for name, file in formats.files(robot).items() if file != robot}
     if isinstance(config.path, WaypointsConfig):
         files["path.file"] = Path(config.path.file)
+    if config.limits.file is not None:
+        files["limits.file"] = find(config.limits.file, "limits.file")
     if config.identification.run:
         files |= {f"conf/reproduction/{name}.yaml": FOLDER / f"{name}.yaml" for name in config.identification.documents}
     return {key: hashlib.sha256(file.read_bytes()).hexdigest() for key, file in files.items()}

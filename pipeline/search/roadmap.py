@@ -15,6 +15,7 @@ import numpy as np
 from pipeline.common.arrays import Array
 from pipeline.problem.problem import Boundary, Problem
 from pipeline.problem.turns import full_turns
+from pipeline.search.floating import OnMovingBase
 from pipeline.search.layers import Edges, closed_paths, through_every_node
 from pipeline.search.manifold import Manifold
 from pipeline.search.selection import diverse
@@ -35,7 +36,7 @@ class Roadmap:
 
     def starts(self, problem: Problem, grid: Array, rng: np.random.Generator) -> Array:
         """Motions (P, N + 1, n) on the knots `grid`, on the path at every knot, cheapest first; P may be 0."""
-        manifold = Manifold(problem)
+        manifold = OnMovingBase(problem) if problem.task.arm.base.count else Manifold(problem)
         none = np.empty((0, len(grid), manifold.n))
         times = np.interp(np.linspace(0, len(grid) - 1, self.layers + 1), np.arange(len(grid)), grid)
         nodes = _Sampler(manifold, times, self.nodes, rng).layers()
@@ -43,9 +44,10 @@ class Roadmap:
             return none
         closed = problem.boundary is Boundary.CYCLIC
         cheapest = closed_paths if closed else through_every_node
-        paths, costs = cheapest(edge_costs(manifold, times, nodes, problem.bounds.velocity))
+        velocity = problem.bounds.velocity[manifold.joints]
+        paths, costs = cheapest(edge_costs(manifold, times, nodes, velocity))
         if not len(paths):  # too fast everywhere: what is nearest to the limits is for the solver to find
-            paths, costs = cheapest(edge_costs(manifold, times, nodes, np.full(manifold.n, np.inf)))
+            paths, costs = cheapest(edge_costs(manifold, times, nodes, np.full_like(velocity, np.inf)))
         coarse = np.stack([layer[column] for layer, column in zip(nodes, paths.T, strict=True)], axis=1)
         turns = np.cumsum(manifold.wrap(np.diff(coarse, axis=1)), axis=1)
         coarse[:, 1:] = coarse[:, :1] + turns
@@ -64,11 +66,14 @@ class Roadmap:
 
 
 def edge_costs(manifold: Manifold, times: Array, nodes: list[Array], velocity: Array) -> Edges:
-    """Of every pair of neighbours 1/2 d'G d/dt, G the mean of both ends' metrics; infinite beyond `velocity` (n,)."""
+    """Of every pair of neighbours 1/2 d'G d/dt of the joints, G the mean of both ends' metrics; infinite beyond
+    `velocity` (joints,).
+    """
     roots = [np.linalg.cholesky(manifold.metric(layer)) for layer in nodes]
-    n, edges = manifold.n, []
+    n, edges = len(velocity), []
     for i, dt in enumerate(np.diff(times)):
-        d = manifold.wrap(nodes[i + 1][None] - nodes[i][:, None]).transpose(2, 0, 1).astype(np.float32)
+        d = manifold.wrap(nodes[i + 1][None] - nodes[i][:, None])[..., manifold.joints]
+        d = d.transpose(2, 0, 1).astype(np.float32)
         cost = np.zeros(d.shape[1:], np.float32)
         for column in range(n):  # |L'd|^2 for both ends' roots
             for root, axes in ((roots[i + 1], np.s_[None, :]), (roots[i], np.s_[:, None])):
@@ -93,11 +98,11 @@ class _Sampler:
     def layers(self) -> list[Array]:
         closed = self.manifold.problem.boundary is Boundary.CYCLIC
         for layer in range(0 if self.given is None else 1, self.last if closed else self.last + 1):
-            self.parts[layer].append(self.manifold.draw(self.x[layer], self.count // 2, self.rng))
+            self.parts[layer].append(self._drawn(layer, self.count // 2))
         first = max(1, self.last // 4) if self.given is not None else 0
         bases = sorted({first, self.last // 2, self.last})
         for base in bases:
-            drawn = self.manifold.draw(self.x[base], max(1, self.count // 2 // len(bases)), self.rng)
+            drawn = self._drawn(base, max(1, self.count // 2 // len(bases)))
             self.parts[base].append(drawn)
             self._carry(drawn, base, 1)
             self._carry(drawn, base, -1)
@@ -108,14 +113,22 @@ class _Sampler:
             self.parts[-1] = self.parts[0]
         return [np.concatenate(part) for part in self.parts]
 
+    def _drawn(self, layer: int, count: int) -> Array:
+        draw = self.manifold.draw if layer else self.manifold.first
+        return draw(self.x[layer], count, self.rng)
+
     def _carry(self, q: Array, layer: int, direction: int) -> None:
         """Along the path to its end, as far as the limits allow, in two steps from layer to layer."""
-        end = self.last if direction > 0 else 0 if self.given is None else 1
-        while layer != end and len(q):
+        # Where a motion begins, a base that moves stands where it stands.
+        first = 1 if self.given is not None or self.manifold.problem.task.arm.base.count else 0
+        end = self.last if direction > 0 else first
+        while (end - layer) * direction > 0 and len(q):
             ahead = layer + direction
-            for time in (0.5 * (self.times[layer] + self.times[ahead]), self.times[ahead]):
+            half = 0.5 * (self.times[ahead] - self.times[layer])
+            for time in (self.times[ahead] - half, self.times[ahead]):
                 target = np.tile(self.manifold.problem.reference.position(np.array([time])), (len(q), 1))
                 if len(q):
+                    q = self.manifold.wait(q, half)
                     q, arrived = self.manifold.project(q, target, self.manifold.metric(q), steps=10)
                     q = q[arrived]
                     q = q[self.manifold.allowed(q)]
@@ -127,12 +140,6 @@ def _on_grid(manifold: Manifold, times: Array, coarse: Array, grid: Array) -> Ar
     """The motions (P, L + 1, n) between layers, put onto the path at the knots `grid`; without those that lose it."""
     at = np.clip(np.searchsorted(times, grid, side="right") - 1, 0, len(times) - 2)
     share = ((grid - times[at]) / (times[at + 1] - times[at]))[:, None]
-    q = np.clip(coarse[:, at] * (1 - share) + coarse[:, at + 1] * share, manifold.lower, manifold.upper)
-    target = np.tile(manifold.problem.reference.position(grid), (len(q), 1))
-    flat, arrived = manifold.project(q.reshape(-1, manifold.n), target, steps=12, tolerance=1e-7)
-    motions = flat.reshape(q.shape)
-    if manifold.problem.boundary is Boundary.FIXED:
-        motions[:, 0] = manifold.problem.q_init
-    if manifold.problem.boundary is Boundary.CYCLIC:
-        motions[:, -1] = motions[:, 0] + full_turns(manifold.problem, motions[:, 0], motions[:, -1])
-    return motions[arrived.reshape(len(q), -1)[:, 1:].all(axis=1)]
+    wished = np.clip(coarse[:, at] * (1 - share) + coarse[:, at + 1] * share, manifold.lower, manifold.upper)
+    motions, arrived = manifold.along(grid, wished)
+    return motions[arrived]

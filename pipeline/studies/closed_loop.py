@@ -132,7 +132,7 @@ def effort_limits(problem: Problem) -> Array:
 def simulate(problem: Problem, evaluation: Evaluation, options: ClosedLoopConfig) -> ClosedLoop:
     """Follow the motion once. The controller knows the arm exactly but for options.mass_error."""
     arm, n = problem.task.arm, problem.task.arm.n
-    spline = curve(problem, evaluation.time, evaluation.q)
+    spline = curve(problem, evaluation.time, evaluation.q, evaluation.solution.trajectory.ends)
     knots = spline.x
     # A cubic spline is the Hermite interpolant of its own slopes.
     reference = PiecewisePolynomial.CubicHermite(knots, spline(knots).T, spline(knots, 1).T)

@@ -20,7 +20,7 @@ from pipeline.run.solve import solve
 from pipeline.run.state import state
 from tests.support import composed
 
-FEW = ("configurations=4", "candidates=30", "optimised=4", "same_path=0.5")
+FEW = ("configurations=4", "candidates=30", "optimised=1", "same_path=0.5", "refine_to=null")
 SMALL = (
     *(f"method.global.{word}" for word in FEW),
     *(
@@ -30,7 +30,13 @@ SMALL = (
         "method.lsv.dt=0.1",
         "method.inertia_weighted.dt=0.1",
     ),
-    *("method.pmke.dt=0.02", "method.pareto.steps=2", "method.pareto.rounds=0", "method.receding.update_interval=2"),
+    *(
+        "method.pmke.dt=0.02",
+        "method.pareto.steps=2",
+        "method.pareto.rounds=0",
+        "method.pareto.max_iterations=60",
+        "method.receding.update_interval=2",
+    ),
     *("method.dynamic_programming.nodes=60", "method.dynamic_programming.intervals=6"),
     *("method.calculus_of_variations.spacing=0.3", "method.calculus_of_variations.refinements=1"),
     *("method.calculus_of_variations.max_speed=0.5", "method.pontryagin.guesses=2", "method.pontryagin.intervals=10"),
@@ -47,6 +53,7 @@ PROBLEMS = {
         *SMALL,
         "objective=reaction",
         "method.pmke.objective=kinetic_energy",
+        "method.receding.objective=kinetic_energy",
         "method.pareto.objectives=[reaction_force,torque]",
     ),
     "r = 2": (*SMALL, "robot=planar4r"),

@@ -133,7 +133,7 @@ def reproduce_here(
 def test_a_line_per_experiment_and_nothing_twice(
     reproduce_here: Callable[..., tuple[int, str, str]], tmp_path: Path
 ) -> None:
-    words = ("pontryagin", "methods=[pontryagin_as_printed]")
+    words = ("pontryagin", "methods=[pontryagin_as_printed]", "timing.steps=50")
     code, out, error = reproduce_here(*words)
     assert (code, error) == (0, "")
     cases = ("case1", "case2", "case3", "case4a", "case4b")

@@ -110,6 +110,7 @@ calculus_of_variations = Method(
         boundaries=frozenset((Boundary.FIXED, Boundary.FREE)),
         constraints=False,
         moving_base=False,
+        rest=False,
     ),
     solve,
 )

@@ -10,6 +10,7 @@ from pipeline.common.arrays import Array
 from pipeline.problem.curve import whole
 from pipeline.problem.problem import Problem
 from pipeline.problem.resolution import MOST, divided, resolving, roughly, steps_needed
+from pipeline.problem.solution import Trajectory
 
 INNER = 4  # sub-intervals per knot interval at which a motion is held against its path
 
@@ -67,7 +68,9 @@ def off_path(problem: Problem, q: Array) -> tuple[float, float]:
     """How far the exported curve through the knots q (N + 1, n) is from its path, at most: [m] and [rad]."""
     moments = divided(problem.times, INNER)
     rows = len(problem.task.axes)
-    error = problem.task.error(whole(problem, problem.times, q)(moments), problem.reference.position(moments))
+    error = problem.task.error(
+        whole(problem, Trajectory(problem.times, q))(moments), problem.reference.position(moments)
+    )
     parts = (np.linalg.norm(part, axis=1).max(initial=0.0) for part in (error[:, :rows], error[:, rows:]))
     distance, angle = map(float, parts)
     return distance, angle

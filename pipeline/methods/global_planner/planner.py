@@ -20,6 +20,7 @@ from pipeline.methods.global_planner.batch import Batch
 from pipeline.methods.global_planner.grids import coarsest, finer, on_knots, refinement
 from pipeline.methods.global_planner.optimum import Optimum, go_on, optimise_start, refine
 from pipeline.methods.global_planner.reasons import no_feasible, no_optimum, no_start
+from pipeline.methods.global_planner.smooth import rough, smooth, splined, unserved
 from pipeline.methods.method import ANY, Context, Method
 from pipeline.model.kinematics import wrap
 from pipeline.problem.limits import LIMIT_KINDS
@@ -60,6 +61,16 @@ HOPELESS = 0.1  # relative violation on a coarse grid from which on finer ones a
 
 def solve(problem: Problem, options: GlobalOptions, context: Context) -> list[Solution]:
     """The distinct optima found from these starts, best first."""
+    if not splined(problem, options):
+        return by_differences(problem, options, context)
+    found = by_differences(rough(problem), options, context)
+    if found[0].found:  # on the knots that the path needs
+        problem = replace(problem, times=found[0].trajectory.time)
+    return smooth(problem, found, options, context)
+
+
+def by_differences(problem: Problem, options: GlobalOptions, context: Context) -> list[Solution]:
+    """The same on the knots alone, as the papers have it."""
     why = Batch.without(problem, options)
     times, too_coarse = on_knots(problem, options.refine_to)
     if too_coarse:
@@ -71,7 +82,7 @@ def solve(problem: Problem, options: GlobalOptions, context: Context) -> list[So
         return [_nothing(problem, Status.INFEASIBLE, no_start(problem, log.get("drawn", 0)), log)]
 
     batch = Batch(problem, options) if why is None else None
-    log["solver"] = "newton, confirmed by ipopt" if why is None else f"ipopt ({why})"
+    log["solver"] = f"ipopt ({why})" if batch is None else batch.words
     while True:
         starts = _optimise_starts(problem, grids[0], options, motions, batch, context)
         if any(start.converged for start in starts):
@@ -125,10 +136,12 @@ def solve(problem: Problem, options: GlobalOptions, context: Context) -> list[So
 
 
 def refuses(problem: Problem, options: GlobalOptions) -> str | None:
-    """Starts by dynamic programming serve only what that method serves."""
+    """Starts by dynamic programming serve only what that method serves; differences know no rest."""
+    if why := unserved(problem, options):
+        return why
     if "dynamic_programming" not in STARTS[options.starts]:
         return None
-    why = dynamic_programming.dynamic_programming.why_not(problem)
+    why = dynamic_programming.dynamic_programming.why_not(rough(problem))
     return why and f"method.global.starts = {options.starts}: {why}; starts = roadmap serves every problem"
 
 
@@ -155,9 +168,6 @@ def _starts(
     log: dict[str, Any] = {}
     revolute = problem.task.arm.description.revolute
     wanted = STARTS[options.starts]
-    if "roadmap" in wanted and problem.task.arm.base.count:
-        wanted = ("population",)
-        log["roadmap"] = "not for a base that moves or is held: population instead"
     if "roadmap" in wanted:
         paths = Roadmap(options.nodes, options.layers, options.optimised).starts(problem, coarse, rng)
         log["roadmap_paths"] = len(paths)
@@ -203,7 +213,12 @@ def _optimise_starts(
     # Where starts have come to the same motion, one of them goes on for all.
     solved = [first for first in firsts if first.converged]
     chosen = [solved[index] for index in _distinct(solved, options, problem)]
-    further = context.workers.map(go_on, (problem, grid, options), chosen, done)
+    served = batch.further(grid, chosen)
+    left = [first for first, optimum in zip(chosen, served, strict=True) if optimum is None]
+    others = iter(context.workers.map(go_on, (problem, grid, options), left, done))
+    further = [next(others) if optimum is None else optimum for optimum in served]
+    for count, optimum in enumerate(filter(None, served), len(left) + 1):
+        done(count, optimum)
     return [further[_nearest(problem, first, chosen)] if first.converged else first for first in firsts]
 
 
@@ -222,8 +237,7 @@ def _refine_all(
     context: Context,
 ) -> list[Optimum]:
     """Every basin on the last grid: in one batch, and those that it does not finish one by one."""
-    alone = batch is None or problem.objective.second_order
-    refined = [None] * len(basins) if batch is None or alone else batch.refine(grids, basins)
+    refined = [None] * len(basins) if batch is None else batch.refine(grids, basins)
     left = [basin for basin, optimum in zip(basins, refined, strict=True) if optimum is None]
     others = iter(context.workers.map(refine, (problem, grids, options), left))
     return [next(others) if optimum is None else optimum for optimum in refined]

@@ -22,7 +22,7 @@ from scipy.interpolate import make_interp_spline
 from pipeline.common.arrays import Array
 from pipeline.config.methods import GlobalOptions, RecedingOptions
 from pipeline.methods.global_planner.planner import global_planner
-from pipeline.methods.method import ANY, Context, Method
+from pipeline.methods.method import ON_KNOTS, Context, Method
 from pipeline.methods.pmke.prediction import path_weight, rollout, solve_window, window_objective
 from pipeline.methods.singularity import singular_value_ratio
 from pipeline.model.kinematics import project
@@ -46,7 +46,7 @@ def solve(problem: Problem, options: RecedingOptions, context: Context) -> list[
     return [_follow(problem, options)]
 
 
-receding = Method("receding", "PMKE with limits", "#5B7FDB", RecedingOptions, ANY, solve)
+receding = Method("receding", "PMKE with limits", "#5B7FDB", RecedingOptions, ON_KNOTS, solve)
 
 
 def _follow(problem: Problem, options: RecedingOptions) -> Solution:
