@@ -22,7 +22,7 @@ from pipeline.methods.global_planner.batch import JUMPS, Batch
 from pipeline.methods.global_planner.grids import coarsest, finer, on_knots, refinement
 from pipeline.methods.global_planner.optimum import Optimum, go_on, optimise_start, refine
 from pipeline.methods.global_planner.reasons import no_feasible, no_optimum, no_start
-from pipeline.methods.global_planner.smooth import rough, smooth, splined, unserved
+from pipeline.methods.global_planner.smooth import freer, rough, smooth, splined, unserved
 from pipeline.methods.global_planner.starts import Starts
 from pipeline.methods.method import ANY, Context, Method
 from pipeline.model.kinematics import wrap
@@ -58,6 +58,8 @@ def solve(problem: Problem, options: GlobalOptions, context: Context) -> list[So
     if not splined(problem, options):
         return by_differences(problem, options, context)
     found = by_differences(rough(problem), options, context)
+    if not found[0].found and problem.constrained:
+        found = max(found, by_differences(freer(problem), options, context), key=lambda motions: motions[0].found)
     if found[0].found:  # on the knots that the path needs
         problem = replace(problem, times=found[0].trajectory.time)
     return smooth(problem, found, options, context)
