@@ -32,6 +32,20 @@ def curve(problem: Problem, time: Array, q: Array, ends: Array | None = None) ->
     return CubicSpline(time, q, bc_type="clamped" if problem.reference.timing.at_rest else "not-a-knot")
 
 
+def end_speeds(problem: Problem, trajectory: Trajectory) -> Array:
+    """The joints' velocities (2, joints) [rad/s] with which a motion begins and ends that a path at rest asks to rest;
+    zero where it asks for none, as a cycle that is repeated or a path that is entered at speed.
+
+    Of knots alone, those of the spline that nothing holds at its ends.
+    """
+    joints = trajectory.q[:, problem.task.arm.base.count :]
+    if problem.boundary is Boundary.CYCLIC or not problem.reference.timing.at_rest:
+        return np.zeros((2, joints.shape[1]))
+    if trajectory.ends is not None:
+        return trajectory.ends
+    return np.asarray(CubicSpline(trajectory.time, joints)(trajectory.time[[0, -1]], 1))
+
+
 def turns_of_cycle(problem: Problem, q: Array) -> Array | None:
     """The full turns [rad] by which the joints of a cycle q (N + 1, joints) wind on; None if it does not close."""
     turns = full_turns(problem, q[0], q[-1])

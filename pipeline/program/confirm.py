@@ -23,6 +23,8 @@ HANDOVER = {
     "slack_bound_push": 1e-14,
     "slack_bound_frac": 1e-14,
     "nlp_scaling_method": "none",
+    "constr_mult_init_max": 1e8,  # else the first multipliers of long rows are put to zero
+    "acceptable_iter": 3,  # where rounding keeps IPOPT from its last digits, at an optimum it cannot gain any
 }
 
 

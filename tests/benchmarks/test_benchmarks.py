@@ -29,9 +29,9 @@ def test_small_programs(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["sim1", "sim5"])
+@pytest.mark.parametrize("name", ["sim1", "sim5", "floating3r"])
 def test_the_planner_beside_its_peer(name: str, capsys: pytest.CaptureFixture[str]) -> None:
-    """sim1: energy, free; sim5: a cycle with limits."""
+    """sim1: energy, free; sim5: a cycle with limits; floating3r: momentum."""
     planner.simulation(name, *FEW_STARTS, "method.global.optimised=12", "timing.steps=24")
     out = capsys.readouterr().out
     assert all(number > 0 for number in line_of(name, out))

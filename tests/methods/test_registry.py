@@ -20,7 +20,7 @@ from pipeline.run.solve import solve
 from pipeline.run.state import state
 from tests.support import composed
 
-FEW = ("configurations=4", "candidates=30", "optimised=1", "same_path=0.5")
+FEW = ("configurations=4", "candidates=30", "optimised=1", "same_path=0.5", "refine_to=null")
 SMALL = (
     *(f"method.global.{word}" for word in FEW),
     *(
@@ -54,6 +54,7 @@ PROBLEMS = {
         *SMALL,
         "objective=reaction",
         "method.pmke.objective=kinetic_energy",
+        "method.receding.objective=kinetic_energy",
         "method.pareto.objectives=[reaction_force,torque]",
     ),
     "r = 2": (*SMALL, "robot=planar4r"),

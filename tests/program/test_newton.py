@@ -10,6 +10,7 @@ import pytest
 from pipeline.build.problem import prepare
 from pipeline.common.arrays import Array
 from pipeline.model.clearance import Clearance
+from pipeline.problem.costs import integrals, objective_values, velocities
 from pipeline.problem.objective import Objective
 from pipeline.problem.problem import Boundary, Problem
 from pipeline.program.confirm import confirm
@@ -167,11 +168,52 @@ def test_clearance_rows_are_drakes(rng: np.random.Generator) -> None:
     rows = Clear(Clearance(problem.task.arm, problem.obstacles).rows())
     near = np.array([-1.35, 0.04, 0.4, -2.1, -2.3, 1.2, 0.7])
     x = near + rng.normal(scale=0.02, size=(1, 3, 7))
-    kept, (by,) = rows.differentiate(x, x)
+    *_, kept, (by,) = rows.differentiate(x, x)
     assert (np.abs(by).max(axis=(1, 2, 3)) > 0.1).all()
-    slope = differences(lambda flat: rows.values(flat.reshape(x.shape), x).ravel(), x.ravel())
+    slope = differences(lambda flat: rows.values(flat.reshape(x.shape), x)[1].ravel(), x.ravel())
     np.testing.assert_allclose(by[0, :, 0], np.einsum("kkn->kn", slope.reshape(3, 3, 7)), atol=1e-6)
-    np.testing.assert_array_equal(rows.values(x, x), kept)
+    np.testing.assert_array_equal(rows.values(x, x)[1], kept)
+
+
+@pytest.mark.parametrize("boundary", BOUNDARIES)
+@pytest.mark.parametrize("enters", ["rest", "speed", "velocity"])
+def test_derivatives_of_torques(boundary: Boundary, enters: str, rng: np.random.Generator) -> None:
+    """Cost and limits beside Drake's torques; gradients, and the Hessian of the whole Lagrangian, by differences."""
+    timing = "constant_speed" if enters == "speed" else "raised_cosine"
+    words = ("limits=joint_torque_power", f"timing={timing}", "timing.steps=7", "path=circle", "path.radius=0.05")
+    problem = prepare(composed("robot=planar4r", *words))
+    given = np.array([0.1, -0.2, 0.3, 0.1]) if enters == "velocity" else None
+    objective = Objective({"kinetic_energy": 0.7, "torque": 0.3})
+    problem = replace(problem, boundary=boundary, objective=objective, qd_init=given)
+    newton = Solver(problem).on(problem.times)
+    motions, knots, scale = newton.motions, newton.knots, 1.7
+    x = knots.unknown(problem.q_init + 0.1 * rng.normal(size=(1, 8, 4)))
+    begin = np.zeros((1, 1, 4)) if knots.cyclic else problem.q_init[None, None]
+    point, whole = motions.differentiate(x, begin), knots.whole(x, begin)
+    assert point.cost == pytest.approx(objective_values(problem, problem.times, whole), rel=1e-9)
+    tau, qd = integrals(problem, problem.times, whole[0]).tau[1:], velocities(problem, problem.times, whole[0])[1:]
+    bounds = problem.bounds
+    load, power = tau / bounds.torque, tau * qd / bounds.power
+    owned = np.concatenate([1 - load, 1 + load, 1 - power, 1 + power], axis=1)
+    kept = np.roll(point.kept[0], -1, axis=0) if knots.cyclic else point.kept[0, -len(tau) :]
+    np.testing.assert_allclose(kept, owned, atol=1e-8)
+
+    z, shape = rng.normal(size=point.kept.shape), (1, knots.count, 4)
+    flat = x.ravel()
+    gradient = differences(lambda y: motions.value(y.reshape(shape), begin)[0][0], flat)
+    np.testing.assert_allclose(point.gradient.ravel(), gradient, atol=1e-7 * np.abs(gradient).max())
+    slope = differences(lambda y: (motions.value(y.reshape(shape), begin)[2] * z).sum(), flat)
+    pull = stencils.pull(knots, point.by, z).ravel()
+    np.testing.assert_allclose(pull, slope, atol=1e-7 * np.abs(slope).max())
+
+    def lagrangian(y: Array) -> Array:
+        at = motions.differentiate(y.reshape(shape), begin)
+        return (scale * at.gradient - stencils.pull(knots, at.by, z)).ravel()
+
+    hessian = differences(lagrangian, flat)
+    more = motions.terms.curvature(x, begin, z, np.array([scale]))
+    found = dense(tuple(scale * a[0] + b[0] for a, b in zip(point.hessian, more, strict=True)), knots.cyclic)
+    np.testing.assert_allclose(found, hessian, atol=1e-7 * np.abs(hessian).max())
 
 
 def solved(*words: str) -> tuple[Problem, Newton, Array]:
@@ -213,6 +255,23 @@ def test_ipopt_confirms_an_optimum_beside_an_obstacle() -> None:
     assert 0.0 <= clearance.min() - problem.obstacles.margin < 1e-3  # the obstacle is in the way; p is a smooth bound
 
 
+@pytest.mark.parametrize("name", ["sim3", "sim4"])
+def test_ipopt_confirms_optima_of_torques(name: str) -> None:
+    """Squares of torques, and in sim4 limits of torques and powers that matter."""
+    problem = prepare(composed(f"+experiment={name}", "timing.steps=25"))
+    starts = Roadmap(nodes=100, most=4).starts(problem, problem.times, np.random.default_rng(1))
+    answer = Solver(problem).on(problem.times).solve(starts)
+    assert answer.converged.any()
+    q = answer.q[np.flatnonzero(answer.converged)[np.argmin(answer.cost[answer.converged])]]
+    told = confirm(problem, problem.times, q, tolerance=1e-8, max_iterations=20)
+    assert told.converged
+    assert told.iterations <= 4
+    assert told.moved < 1e-6
+    tau, qd = np.abs(integrals(problem, problem.times, q).tau), np.abs(velocities(problem, problem.times, q))
+    most = max((tau / problem.bounds.torque).max(), (tau * qd / problem.bounds.power).max())
+    assert most == pytest.approx({"sim3": 0.0, "sim4": 1.0}[name], abs=1e-6)
+
+
 def test_a_start_is_solved_alone_as_among_others() -> None:
     _, newton, starts = solved("+experiment=sim2")
     together, alone = newton.solve(starts[:8]), newton.solve(starts[5:6])
@@ -229,8 +288,9 @@ def test_limits_that_nothing_keeps_are_not_kept_silently() -> None:
 
 
 def test_what_is_not_served_has_a_reason() -> None:
-    assert why_not(prepare(composed("+experiment=sim1"))) is None
-    for name, word in (("sim3", "torque"), ("floating3r", "base")):
-        reason = why_not(replace(prepare(composed(f"+experiment={name}")), limits=None))
-        assert reason is not None
-        assert word in reason
+    for name in ("sim1", "sim4", "panda_obstacle"):
+        problem = prepare(composed(f"+experiment={name}"))
+        assert why_not(replace(problem, limits=None) if problem.obstacles else problem) is None
+    floating, obstacle = (prepare(composed(f"+experiment={name}")) for name in ("floating3r", "panda_obstacle"))
+    assert "base" in str(why_not(floating))
+    assert "obstacles and torques" in str(why_not(obstacle))

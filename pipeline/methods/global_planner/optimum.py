@@ -89,16 +89,20 @@ def go_on(context: tuple[Problem, Array, GlobalOptions], first: Optimum) -> Opti
     served = not problem.objective.second_order and keeps_torque_limits(problem, times, first.q)
     if not first.converged or served:
         return first
-    guess = first.q
-    optimum = optimise(problem, times, guess, options)
-    goes_on = len(times) < len(problem.times)
-    if goes_on and _has_strayed(problem, times, guess, optimum):
-        cost = float(objective_values(problem, times, guess[None])[0])
+    return goes_on(problem, times, first, optimise(problem, times, first.q, options))
+
+
+def goes_on(problem: Problem, times: Array, first: Optimum, optimum: Optimum) -> Optimum:
+    """The optimum of the problem that was found from the first-order one's; or that, where it has strayed and a finer
+    grid is still to come.
+    """
+    if len(times) < len(problem.times) and has_strayed(problem, times, first.q, optimum):
+        cost = float(objective_values(problem, times, first.q[None])[0])
         optimum = replace(first, cost=cost, solves=optimum.solves)
     return replace(optimum, solves=first.solves + optimum.solves)
 
 
-def _has_strayed(problem: Problem, times: Array, guess: Array, optimum: Optimum) -> bool:
+def has_strayed(problem: Problem, times: Array, guess: Array, optimum: Optimum) -> bool:
     """Whether a solve ended far above a guess that keeps every limit: its first steps led into a motion with jumps,
     which coarse differences make an optimum of its own. A finer grid then starts from the guess. Accelerations must
     count for it.
@@ -173,7 +177,7 @@ def refine(context: tuple[Problem, list[Array], GlobalOptions], start: Optimum) 
         guess = CubicSpline(on, optimum.q)(fine)
         finer = _optimise_lazily(problem, fine, guess, options)
         solves += finer.solves
-        lost = not finer.converged or _has_strayed(problem, fine, guess, finer)
+        lost = not finer.converged or has_strayed(problem, fine, guess, finer)
         if not lost or fine is grids[-1]:
             optimum, on, failures = finer, fine, 0
             continue

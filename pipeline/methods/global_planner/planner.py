@@ -82,7 +82,7 @@ def by_differences(problem: Problem, options: GlobalOptions, context: Context) -
         return [_nothing(problem, Status.INFEASIBLE, no_start(problem, log.get("drawn", 0)), log)]
 
     batch = Batch(problem, options) if why is None else None
-    log["solver"] = "newton, confirmed by ipopt" if why is None else f"ipopt ({why})"
+    log["solver"] = f"ipopt ({why})" if batch is None else batch.words
     while True:
         starts = _optimise_starts(problem, grids[0], options, motions, batch, context)
         if any(start.converged for start in starts):
@@ -226,7 +226,12 @@ def _optimise_starts(
     # Where starts have come to the same motion, one of them goes on for all.
     solved = [first for first in firsts if first.converged]
     chosen = [solved[index] for index in _distinct(solved, options, problem)]
-    further = context.workers.map(go_on, (problem, grid, options), chosen, done)
+    served = batch.further(grid, chosen)
+    left = [first for first, optimum in zip(chosen, served, strict=True) if optimum is None]
+    others = iter(context.workers.map(go_on, (problem, grid, options), left, done))
+    further = [next(others) if optimum is None else optimum for optimum in served]
+    for count, optimum in enumerate(filter(None, served), len(left) + 1):
+        done(count, optimum)
     return [further[_nearest(problem, first, chosen)] if first.converged else first for first in firsts]
 
 
@@ -245,8 +250,7 @@ def _refine_all(
     context: Context,
 ) -> list[Optimum]:
     """Every basin on the last grid: in one batch, and those that it does not finish one by one."""
-    alone = batch is None or problem.objective.second_order
-    refined = [None] * len(basins) if batch is None or alone else batch.refine(grids, basins)
+    refined = [None] * len(basins) if batch is None else batch.refine(grids, basins)
     left = [basin for basin, optimum in zip(basins, refined, strict=True) if optimum is None]
     others = iter(context.workers.map(refine, (problem, grids, options), left))
     return [next(others) if optimum is None else optimum for optimum in refined]

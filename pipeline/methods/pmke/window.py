@@ -11,6 +11,7 @@ is built once; `solve` only exchanges the numbers behind it.
 from __future__ import annotations
 
 from typing import Any
+from weakref import proxy
 
 import numpy as np
 from pydrake.solvers import MathematicalProgram
@@ -36,8 +37,9 @@ class Window:
         self._earlier = np.tri(horizon)[:, :, None, None]
         self.program = MathematicalProgram()
         w = self.program.NewContinuousVariables(horizon * self.n, "w")
-        self._rows = DifferentiableConstraint(self._tracking)
-        self.program.AddCost(DifferentiableCost(self._energy), vars=w)
+        here = proxy(self)  # what Drake is given must not keep us alive: Python sees no circle through Drake
+        self._rows = DifferentiableConstraint(lambda w: here._tracking(w))
+        self.program.AddCost(DifferentiableCost(lambda w: here._energy(w)), vars=w)
         self.program.AddConstraint(self._rows, lb=np.zeros(horizon * task.m), ub=np.zeros(horizon * task.m), vars=w)
 
     def solve(

@@ -7,7 +7,7 @@ Each iteration serves all starts and all knots with one call of the kernel.
    is left is Z'HZ, N r unknowns in a narrow band (Nocedal and Wright 2006, Section 18.3), solved by Cholesky. Where it
    is not positive definite it fades into the stiffness M/dt, which always is;
 3. limits c >= 0 by a primal-dual interior point (Nocedal and Wright, chapter 19) with slacks s and, so that a start
-   beyond its limits is none the worse, an excess t that costs PENALTY each: c + t = s, z s = mu, (PENALTY - z) t = mu.
+   beyond its limits is none the worse, an excess t that costs a penalty p each: c + t = s, z s = mu, (p - z) t = mu.
    All this is diagonal: the band stays. Where an excess remains, no motion near the start keeps the limits;
 4. full steps are the rule; others are searched with the filter of Waechter and Biegler (2006), each trial bent back
    onto the path (a second-order correction);
@@ -39,7 +39,7 @@ ON_PATH = 1e-5  # [m, rad] from where the last step is taken
 BARRIER_END = 1e-10
 COMPLEMENTARITY = 10.0  # times BARRIER_END: how far products of slack and multiplier may be from it
 FEASIBLE = 1e-9
-PENALTY = 1e3  # of an excess [rad], in units of the start's cost: multipliers of limits that can be kept are smaller
+
 BEYOND = 1e-6  # [rad] of excess that remains: infeasible
 SHORT, PATIENCE = 1e-3, 3  # more than so many steps shorter than this: lost
 TRIALS = 10
@@ -115,7 +115,7 @@ class Newton:
 
     def __init__(self, motions: Motions, limits: Limits) -> None:
         self.motions, self.knots = motions, motions.knots
-        self.limits = Inequalities(Bounds(self.knots, limits), motions.kept.count)
+        self.limits = Inequalities(Bounds(self.knots, limits), motions.terms.count, motions.terms.penalty)
         self.band = Banded(self.knots.count, motions.n - motions.m, self.knots.cyclic, motions.reach)
 
     def solve(self, q: Array, barrier: Barrier = COLD, *, tolerance: float = 1e-10, max_iterations: int = 60) -> Answer:
@@ -158,7 +158,7 @@ class Newton:
         point = self.motions.differentiate(x, begin)
         kept, mu = self.limits.values(x, begin, point.kept), np.full(count, barrier.mu if self.limits else 0.0)
         slack = np.maximum(kept, barrier.push * self.limits.width)
-        z = np.minimum(mu[:, None] / slack, PENALTY / 2)
+        z = np.minimum(mu[:, None] / slack, self.limits.penalty / 2)
         empty = np.full((count, FILTER), np.inf)
         return State(
             number=np.arange(count),
@@ -166,7 +166,7 @@ class Newton:
             begin=begin,
             scale=1.0 / np.maximum(point.cost, triangular.TINY),
             slack=slack,
-            excess=np.maximum(slack - kept, mu[:, None] / (PENALTY - z)),
+            excess=np.maximum(slack - kept, mu[:, None] / (self.limits.penalty - z)),
             z=z,
             mu=mu,
             seen_theta=empty,
@@ -187,16 +187,15 @@ class Newton:
         multipliers = triangular.backward(point.R, -(YT @ towards[..., None])[..., 0])
         hessian, stiff = (tuple(a * scale[..., None] for a in blocks) for blocks in (point.hessian, point.stiff))
         hessian[0][:] += self.motions.curvature(point, multipliers)
+        more = self.motions.terms.curvature(state.x, state.begin, limits.of_rows(state.z), state.scale)
+        for block, bent in zip(hessian, more, strict=False):
+            block[:] += bent
         driven = gradient
         if limits:
-            other = PENALTY - state.z
+            other = limits.penalty - state.z
             sigma = 1 / (state.slack / state.z + state.excess / other)
             off_centre = lack - mu / state.z + state.slack + mu / other - state.excess
             limits.add(point.by, sigma, hessian, stiff)
-            for block, bent in zip(
-                hessian, self.motions.bent(state.x, state.begin, limits.of_rows(state.z)), strict=False
-            ):
-                block[:] += bent
             driven = gradient - limits.pull(point.by, state.z - sigma * off_centre)
         onto = -(point.Y @ triangular.forward(point.R, point.error)[..., None])[..., 0]
         right = -(ZT @ (driven + knots.product(hessian, onto))[..., None])[..., 0]
@@ -212,16 +211,15 @@ class Newton:
             theta = theta + np.abs(lack).sum(axis=1)
             phi = phi + self._barrier(state.slack, state.excess, state.mu)
             slope = slope - state.mu * (slack_step / state.slack + excess_step / state.excess).sum(axis=1)
-            slope = slope + PENALTY * excess_step.sum(axis=1)
+            slope = slope + excess_step @ limits.penalty
         decrement = np.abs((right * within).sum(axis=(1, 2)))
         return Step(d, slack_step, excess_step, z_step, decrement, slope, theta, phi)
 
     def _lack(self, state: State) -> Array:
         return self.limits.values(state.x, state.begin, state.point.kept) + state.excess - state.slack
 
-    @staticmethod
-    def _barrier(slack: Array, excess: Array, mu: Array) -> Array:
-        return np.asarray(PENALTY * excess.sum(axis=1) - mu * (np.log(slack) + np.log(excess)).sum(axis=1))
+    def _barrier(self, slack: Array, excess: Array, mu: Array) -> Array:
+        return np.asarray(excess @ self.limits.penalty - mu * (np.log(slack) + np.log(excess)).sum(axis=1))
 
     def _reduced(self, Z: Array, blocks: Blocks, stiff: Blocks, right: Array) -> Array:
         """The step (S, U, r) in the null spaces."""
@@ -279,10 +277,14 @@ class Newton:
         theta[:, 0], phi[:, 0] = oldest, step.phi
         if self.limits:
             slack, excess = slack + alpha[:, None] * step.slack, excess + alpha[:, None] * step.excess
-            dual = np.minimum(_fraction(z, step.z, towards), _fraction(PENALTY - z, -step.z, towards))
+            dual = np.minimum(_fraction(z, step.z, towards), _fraction(self.limits.penalty - z, -step.z, towards))
             z = z + dual[:, None] * step.z
             # complementarity within a factor of its target (Waechter and Biegler, eq. (16))
-            z = np.clip(z, 1e-10 * mu[:, None] / slack, np.minimum(1e10 * mu[:, None] / slack, (1 - 1e-12) * PENALTY))
+            z = np.clip(
+                z,
+                1e-10 * mu[:, None] / slack,
+                np.minimum(1e10 * mu[:, None] / slack, (1 - 1e-12) * self.limits.penalty),
+            )
             near = np.abs(state.point.error).max(axis=(1, 2)) < 1e-4
             solved = (step.decrement < 10 * mu) & near & (alpha > 0.3)
             mu = np.where(solved, np.maximum(BARRIER_END, np.minimum(0.1 * mu, mu**1.7)), mu)
