@@ -23,6 +23,7 @@ UNITS = {
     "max_orientation_error": "rad",
     "max_orientation_error_between": "rad",
     "peak_velocity": "rad/s",
+    "peak_acceleration": "rad/s²",
     "peak_torque": "N m",
     "peak_power": "W",
     "min_spectral_radius": "kg m²",

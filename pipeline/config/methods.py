@@ -17,6 +17,7 @@ MethodName = Literal[
     "global",
     "pareto",
     "dynamic_programming",
+    "lower_bound",
     "calculus_of_variations",
     "pontryagin",
     "pontryagin_as_printed",
@@ -171,7 +172,7 @@ class GlobalOptions:
 
 @schema
 class DynamicProgrammingOptions:
-    """Dynamic programming on a grid of the self-motion manifold (r = 1): a certificate for the global optimum."""
+    """Dynamic programming on a grid of the self-motion manifold (r = 1): an estimate of the best, and starts."""
 
     nodes: Annotated[Whole, Field(ge=8, le=10_000, description="on the longest manifold along the path")] = 360
     intervals: Annotated[
@@ -184,6 +185,18 @@ class DynamicProgrammingOptions:
     same_path: Annotated[
         Apart, Field(description="[rad] paths closer than this, but for full turns, are one optimum")
     ] = 0.2
+
+
+@schema
+class LowerBoundOptions:
+    """A bound from below on the cost of every motion on a grid's knots, by cells of the self-motion loops (r = 1)."""
+
+    intervals: Annotated[
+        Annotated[Whole, Field(ge=5, le=MOST_KNOTS)] | None,
+        Field(description="of the time grid; null: those of timing.steps"),
+    ] = 50
+    gap: Annotated[Number, Field(ge=1e-6, lt=1, description="relative, to the best motion found: where to stop")] = 1e-3
+    cells: Annotated[Whole, Field(ge=8, le=10_000, description="on the longest manifold, before any is halved")] = 120
 
 
 @schema
@@ -256,6 +269,7 @@ class MethodConfig:
     global_: Annotated[GlobalOptions, Field(alias="global")] = GlobalOptions()
     pareto: ParetoOptions = ParetoOptions()
     dynamic_programming: DynamicProgrammingOptions = DynamicProgrammingOptions()
+    lower_bound: LowerBoundOptions = LowerBoundOptions()
     calculus_of_variations: CalculusOfVariationsOptions = CalculusOfVariationsOptions()
     pontryagin: PontryaginOptions = PontryaginOptions()
     pontryagin_as_printed: PontryaginAsPrintedOptions = PontryaginAsPrintedOptions()

@@ -26,7 +26,7 @@ from pipeline.problem.problem import Problem
 from pipeline.program.confirm import Confirmation, confirm
 from pipeline.program.newton.newton import WARM
 from pipeline.program.newton.serve import Solver
-from tests.benchmarks import peer, planner
+from tests.benchmarks import bound, peer, planner
 
 REPEATS = 7
 
@@ -102,9 +102,12 @@ def _fine(problem: Problem, guess: Array, options: GlobalOptions) -> Confirmatio
 
 
 def main(words: list[str]) -> None:
-    """All parts, or only `small` or `planner`, and of that only the simulations named."""
-    if words and words[0] not in ("small", "planner"):
-        sys.exit(f"{words[0]}: not one of small, planner")
+    """Small programs and whole plans, or only `small` or `planner`, of that only the simulations named; or `bound`."""
+    if words and words[0] not in ("small", "planner", "bound"):
+        sys.exit(f"{words[0]}: not one of small, planner, bound")
+    if words[:1] == ["bound"]:
+        bound.main(words[1:])
+        return
     if words[:1] != ["planner"]:
         print(f"{'medians':<34} {'ours [ms]':>9} {'peer [ms]':>9} {'ratio':>7}")
         predictions()

@@ -41,7 +41,13 @@ def test_the_planner_beside_its_peer(name: str, capsys: pytest.CaptureFixture[st
     assert float(re.findall(r"limits kept to (\S+)", out)[0]) < 1e-6
 
 
-@pytest.mark.parametrize("words", [["large"], ["planner", "sim9"]])
+def test_a_bound_from_below(capsys: pytest.CaptureFixture[str]) -> None:
+    benchmarks.main(["bound", "traj4:6"])
+    out = capsys.readouterr().out
+    assert re.search(r"^traj4 +6 +0\.02\S+ +0\.0\S+ % ", out, re.M)
+
+
+@pytest.mark.parametrize("words", [["large"], ["planner", "sim9"], ["bound", "sim9"]])
 def test_an_unknown_part_is_refused(words: list[str]) -> None:
     with pytest.raises(SystemExit, match="not one of"):
         benchmarks.main(words)

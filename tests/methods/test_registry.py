@@ -38,6 +38,7 @@ SMALL = (
         "method.receding.update_interval=2",
     ),
     *("method.dynamic_programming.nodes=60", "method.dynamic_programming.intervals=6"),
+    *("method.lower_bound.intervals=6", "method.lower_bound.cells=30"),
     *("method.calculus_of_variations.spacing=0.3", "method.calculus_of_variations.refinements=1"),
     *("method.calculus_of_variations.max_speed=0.5", "method.pontryagin.guesses=2", "method.pontryagin.intervals=10"),
 )
@@ -62,8 +63,8 @@ BASELINES = {"lsv", "inertia_weighted", "pmke", "receding", "global", "pareto"}
 SERVED = {
     "fixed": set(METHODS),
     "free": set(METHODS),
-    "cyclic": BASELINES | {"dynamic_programming"},
-    "limits": BASELINES | {"dynamic_programming"},
+    "cyclic": BASELINES | {"dynamic_programming", "lower_bound"},
+    "limits": BASELINES | {"dynamic_programming", "lower_bound"},
     "torque": BASELINES,
     "floating": BASELINES,
     "held": BASELINES,

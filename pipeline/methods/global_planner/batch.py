@@ -119,8 +119,7 @@ class Batch:
 
     def _again(self, times: Array, first: Optimum) -> Optimum | None:
         """Where torque limits matter after all."""
-        (optimum,) = self.further(times, [first]) if first.converged else (None,)
-        return optimum and replace(optimum, solves=[*first.solves, *optimum.solves])
+        return self.further(times, [first])[0] if first.converged else None
 
     def _suffices(self, times: Array, optimum: Optimum) -> bool:
         """Whether an optimum without torques is one of the problem."""

@@ -22,7 +22,7 @@ from pipeline.methods.global_planner.batch import JUMPS, Batch
 from pipeline.methods.global_planner.grids import coarsest, finer, on_knots, refinement
 from pipeline.methods.global_planner.optimum import Optimum, go_on, optimise_start, refine
 from pipeline.methods.global_planner.reasons import no_feasible, no_optimum, no_start
-from pipeline.methods.global_planner.smooth import rough, smooth, splined, unserved
+from pipeline.methods.global_planner.smooth import freer, rough, smooth, splined, unserved
 from pipeline.methods.global_planner.starts import Starts
 from pipeline.methods.method import ANY, Context, Method
 from pipeline.model.kinematics import wrap
@@ -58,6 +58,8 @@ def solve(problem: Problem, options: GlobalOptions, context: Context) -> list[So
     if not splined(problem, options):
         return by_differences(problem, options, context)
     found = by_differences(rough(problem), options, context)
+    if not found[0].found and problem.constrained:
+        found = max(found, by_differences(freer(problem), options, context), key=lambda motions: motions[0].found)
     if found[0].found:  # on the knots that the path needs
         problem = replace(problem, times=found[0].trajectory.time)
     return smooth(problem, found, options, context)
@@ -102,13 +104,7 @@ def by_differences(problem: Problem, options: GlobalOptions, context: Context) -
         for start in starts
     ]
     log["barren_starts"] = coarse.barren
-    refined = _refine_all(problem, grids, options, coarse.optima, batch, context)
-    while (parted := finer(problem, options.refine_to, _cheapest(refined))) is not None:
-        problem, grids = replace(problem, times=parted), [*grids, parted]
-        again = [fine for fine in refined if _good(fine)]
-        batch = batch and Batch(problem, options)
-        newer = iter(_refine_all(problem, grids[-2:], options, again, batch, context))
-        refined = [next(newer) if _good(fine) else fine for fine in refined]
+    problem, grids, refined = _to_the_end(problem, grids, options, coarse.optima, batch, context)
     log["grids"] = [len(grid) - 1 for grid in grids]
     found = [(fine, members) for fine, members in zip(refined, coarse.members, strict=True) if _good(fine)]
     if options.refine_to is not None:  # the grid is that of the best: others may need a finer one, or jump on any
@@ -117,7 +113,8 @@ def by_differences(problem: Problem, options: GlobalOptions, context: Context) -
         log["optima_off_path"], found = len(found) - len(sent), sent
     log["jumping_optima"] = coarse.jumping + sum(fine.converged and not fine.continuous for fine in refined)
     if not found:
-        return [_nothing(problem, Status.NOT_CONVERGED, no_optimum(problem, grids[0], starts, refined), log)]
+        why_not = no_optimum(problem, grids[0], starts, refined, coarse.jumping)
+        return [_nothing(problem, Status.NOT_CONVERGED, why_not, log)]
     members = {id(fine): count for fine, count in found}
     ranked = basins(problem, problem.times, [fine for fine, _ in found], options.same_path).optima
     count = f"{len(ranked)} distinct optim{'um' if len(ranked) == 1 else 'a'} found from {len(starts)} starts"
@@ -134,12 +131,31 @@ def by_differences(problem: Problem, options: GlobalOptions, context: Context) -
                 optimum=rank + 1,
                 tracking_tolerance=TRACKING,
                 limits_kept=LIMIT_KINDS,
-                evidence=(words if rank == 0 else "") + fine.evidence,
                 knots_only=options.refine_to is None,
+                evidence=(words if rank == 0 else "") + fine.evidence,
                 statistics={**(log if rank == 0 else {}), **own},
             )
         )
     return solutions
+
+
+def finish(
+    problem: Problem, times: Array, motions: Array, options: GlobalOptions, context: Context
+) -> tuple[Array, list[Optimum]]:
+    """The distinct optima, best first, to which motions (S, N + 1, n) on the knots `times` lead, and the knots that
+    they are on: the problem's, or those that its path needs. Motions that are lost on the way are left out.
+    """
+    knots, too_coarse = on_knots(problem, options.refine_to)
+    if too_coarse:
+        return knots, []
+    problem = replace(problem, times=knots)
+    batch = Batch(problem, options) if Batch.without(problem, options) is None else None
+    grids = [times, *(grid for grid in refinement(knots, len(times)) if len(grid) > len(times))]
+    starts = _optimise_starts(problem, times, options, motions, batch, context)
+    chosen = basins(problem, times, starts, options.same_path).optima
+    problem, _, refined = _to_the_end(problem, grids, options, chosen, batch, context)
+    good = [optimum for optimum in refined if _good(optimum)]
+    return problem.times, basins(problem, problem.times, good, options.same_path).optima
 
 
 def refuses(problem: Problem, options: GlobalOptions) -> str | None:
@@ -152,7 +168,7 @@ def refuses(problem: Problem, options: GlobalOptions) -> str | None:
     return why and f"method.global.starts = {words}: {why}; starts = roadmap serves every problem"
 
 
-global_planner = Method("global", "Global optimum", "#2F855A", GlobalOptions, ANY, solve, refuses)
+global_planner = Method("global", "Planner's optimum", "#2F855A", GlobalOptions, ANY, solve, refuses)
 
 
 def _good(optimum: Optimum) -> bool:
@@ -242,15 +258,36 @@ def _refine_all(
     problem: Problem,
     grids: list[Array],
     options: GlobalOptions,
-    basins: list[Optimum],
+    optima: list[Optimum],
     batch: Batch | None,
     context: Context,
 ) -> list[Optimum]:
-    """Every basin on the last grid: in one batch, and those that it does not finish one by one."""
-    refined = [None] * len(basins) if batch is None else batch.refine(grids, basins)
-    left = [basin for basin, optimum in zip(basins, refined, strict=True) if optimum is None]
+    """Every optimum on the last grid: in one batch, and those that it does not finish one by one."""
+    refined = [None] * len(optima) if batch is None else batch.refine(grids, optima)
+    left = [before for before, optimum in zip(optima, refined, strict=True) if optimum is None]
     others = iter(context.workers.map(refine, (problem, grids, options), left))
     return [next(others) if optimum is None else optimum for optimum in refined]
+
+
+def _to_the_end(
+    problem: Problem,
+    grids: list[Array],
+    options: GlobalOptions,
+    optima: list[Optimum],
+    batch: Batch | None,
+    context: Context,
+) -> tuple[Problem, list[Array], list[Optimum]]:
+    """Every optimum on the last grid, and on finer ones while the best leaves its path between knots; the problem is
+    then the one on these.
+    """
+    refined = _refine_all(problem, grids, options, optima, batch, context)
+    while (parted := finer(problem, options.refine_to, _cheapest(refined))) is not None:
+        problem, grids = replace(problem, times=parted), [*grids, parted]
+        again = [fine for fine in refined if _good(fine)]
+        batch = batch and Batch(problem, options)
+        newer = iter(_refine_all(problem, grids[-2:], options, again, batch, context))
+        refined = [next(newer) if _good(fine) else fine for fine in refined]
+    return problem, grids, refined
 
 
 def _nothing(problem: Problem, status: Status, message: str, log: dict[str, Any]) -> Solution:
