@@ -1,8 +1,8 @@
 """Whole plans on the Global paper's simulations beside those of CasADi + IPOPT with exact Hessians, interleaved.
 
-The peer gets the planner's own starts, grids, splines between grids, choice of basins and tolerances; only the solves
-differ: ours are batches of Newton's method with IPOPT's confirmation. Timed is processor time, not imports, not the
-drawing of the starts, and not the peer's construction of its functions.
+The peer gets the first lot of the planner's own starts, grids, splines between grids, choice of basins and tolerances;
+only the solves differ: ours are batches of Newton's method with IPOPT's confirmation. Timed is processor time, not the
+imports, not the drawing of the starts, and not the peer's construction of its functions.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from pipeline.common.arrays import Array
 from pipeline.config.methods import GlobalOptions
 from pipeline.methods.global_planner import optimum, planner
 from pipeline.methods.global_planner.basins import basins
-from pipeline.methods.global_planner.batch import Batch
+from pipeline.methods.global_planner.batch import JUMPS, Batch
 from pipeline.methods.global_planner.grids import refinement
 from pipeline.methods.global_planner.optimum import Optimum
 from pipeline.methods.global_planner.starts import Starts
@@ -103,8 +103,7 @@ class Plan:
         problem, grids, options = self.problem, self.grids, self.options
         batch, context = None if self.alone else Batch(problem, options), Context()
         starts = planner._optimise_starts(problem, grids[0], options, self.motions, batch, context)
-        chosen = basins(problem, grids[0], starts, options.same_path).optima
-        return self._kept(planner._refine_all(problem, grids, options, chosen, batch, context))
+        return self._kept(planner._refine_all(problem, grids, options, self._basins(starts), batch, context))
 
     def theirs(self) -> list[Optimum]:
         """The same steps, every solve by the peer."""
@@ -112,15 +111,20 @@ class Plan:
         first = optimum.first_order(problem)
         with mock.patch.object(optimum, "optimise", self.peer.optimise):
             starts = [self.peer.optimise(first, grids[0], motion, options) for motion in self.motions]
-            chosen = basins(problem, grids[0], starts, options.same_path).optima
+            chosen = self._basins(starts)
             if first is not problem:
                 starts = [optimum.go_on((problem, grids[0], options), start) for start in chosen]
-                chosen = basins(problem, grids[0], starts, options.same_path).optima
+                chosen = self._basins(starts)
             return self._kept([optimum.refine((problem, grids, options), start) for start in chosen])
 
     def _kept(self, fine: list[Optimum]) -> list[Optimum]:
         good = [one for one in fine if one.converged and one.continuous]
         return basins(self.problem, self.problem.times, good, self.options.same_path).optima
+
+    def _basins(self, starts: list[Optimum]) -> list[Optimum]:
+        problem, first = self.problem, optimum.first_order(self.problem)
+        filters = {"jumps": JUMPS, "dearest": planner.DEAREST} if first is problem and not self.alone else {}
+        return basins(problem, self.grids[0], starts, self.options.same_path, **filters).optima
 
 
 def simulation(name: str, *words: str) -> None:

@@ -4,7 +4,7 @@
 
 which draws the problems from fixed seeds and searches each from 600 random motions: random configurations at one to
 three random knots, joined by straight lines of the joints and put back onto the path. None of that is the planner's way
-to start.
+to start. Motions that leave their path by more than path.tolerance between the knots are none: most of them jump.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from pipeline.build.problem import prepare
 from pipeline.common.arrays import Array
 from pipeline.common.errors import InputError
 from pipeline.methods.global_planner.grids import refinement
-from pipeline.methods.global_planner.optimum import stays_on_path
+from pipeline.methods.global_planner.optimum import strays
 from pipeline.problem.problem import Boundary, Problem
 from pipeline.program.newton.newton import WARM
 from pipeline.program.newton.serve import Solver
@@ -105,7 +105,7 @@ def optima(problem: Problem, count: int, seed: int) -> list[float]:
         kept = distinct(q, cost, len(q), 0.05, revolute)
         answer = solver.on(grid).solve(CubicSpline(before, q[kept], axis=1)(grid), WARM)
     good = answer.converged & (answer.residual < 1e-8)
-    good &= np.array([stays_on_path(problem, problem.times, motion) for motion in answer.q])
+    good &= np.array([strays(problem, problem.times, q) <= problem.reference.tolerance for q in answer.q])
     kept = distinct(answer.q[good], answer.cost[good], len(q), 0.05, revolute)
     return [float(cost) for cost in answer.cost[good][kept]]
 

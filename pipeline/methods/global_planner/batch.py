@@ -23,6 +23,7 @@ from pipeline.methods.global_planner.optimum import (
     keeps_torque_limits,
     optimise,
     stays_on_path,
+    strays,
 )
 from pipeline.problem.costs import objective_values
 from pipeline.problem.problem import Problem
@@ -32,6 +33,7 @@ from pipeline.program.newton.serve import Solver, why_not
 
 ON_PATH = 1e-8  # [m, rad] at every knot
 JUMPS = 0.1  # of the path's length: an optimum that leaves it so far between coarse knots is not refined
+NEARER = 0.5  # times as far off its path a motion is on twice as many knots; others are by a tenth
 SMOOTH = 0.003  # of the path's length: an optimum that leaves it farther and is lost on a finer grid has jumped
 
 
@@ -92,7 +94,7 @@ class Batch:
                 found = self._finer(first, on, fine, [optimum for _, optimum in part])
                 for (k, before), finer in zip(part, found, strict=True):
                     refined[k] = finer and replace(finer, solves=before.solves + finer.solves)
-                    if first and self._has_jumped(on, before, finer):
+                    if first and self._has_jumped((on, before), (fine, finer)):
                         refined[k] = replace(finer or before, continuous=False)
             on = fine
         return [optimum and self._finish(on, optimum) for optimum in refined]
@@ -127,11 +129,18 @@ class Batch:
             and keeps_torque_limits(self.problem, times, optimum.q)
         )
 
-    def _has_jumped(self, on: Array, optimum: Optimum, finer: Optimum | None) -> bool:
-        """Whether an optimum on the knots `on` was one of that grid alone: a finer one lost it, or made it dear."""
+    def _has_jumped(self, coarse: tuple[Array, Optimum], fine: tuple[Array, Optimum | None]) -> bool:
+        """Whether an optimum was one of its coarse knots alone: finer ones lose it, make it dear, or leave it as far
+        off its path between them.
+        """
+        times, finer = fine
         if finer is None:
-            return not stays_on_path(self.problem, on, optimum.q, SMOOTH)
-        return finer.cost > STRAYED * optimum.cost
+            return not stays_on_path(self.problem, coarse[0], coarse[1].q, SMOOTH)
+        off = strays(self.problem, times, finer.q)
+        follows = off <= self.problem.reference.tolerance or off <= NEARER * strays(
+            self.problem, coarse[0], coarse[1].q
+        )
+        return finer.cost > STRAYED * coarse[1].cost or not follows
 
     def _whether_continuous(self, times: Array, optimum: Optimum, share: float) -> Optimum:
         return replace(optimum, continuous=stays_on_path(self.problem, times, optimum.q, share))

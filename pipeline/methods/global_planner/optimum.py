@@ -235,8 +235,11 @@ def stays_on_path(problem: Problem, times: Array, q: Array, share: float = STAYS
 
     A finite-difference program also has optima that jump to another branch of the manifold within one interval.
     """
+    return strays(problem, times, q) <= share * problem.reference.geometry.length
+
+
+def strays(problem: Problem, times: Array, q: Array) -> float:
+    """How far [m] the cubic spline through the knots is from its path halfway between them, at most."""
     middle = (times[1:] + times[:-1]) / 2
     gap = problem.task.error(CubicSpline(times, q)(middle), problem.reference.position(middle))
-    return bool(
-        np.linalg.norm(gap[:, : len(problem.task.axes)], axis=1).max() <= share * problem.reference.geometry.length
-    )
+    return float(np.linalg.norm(gap[:, : len(problem.task.axes)], axis=1).max())

@@ -107,6 +107,10 @@ def by_differences(problem: Problem, options: GlobalOptions, context: Context) -
     problem, grids, refined = _to_the_end(problem, grids, options, coarse.optima, batch, context)
     log["grids"] = [len(grid) - 1 for grid in grids]
     found = [(fine, members) for fine, members in zip(refined, coarse.members, strict=True) if _good(fine)]
+    if options.refine_to is not None:  # the grid is that of the best: others may need a finer one, or jump on any
+        best = min((fine.cost for fine, _ in found), default=np.inf)
+        sent = [pair for pair in found if pair[0].cost == best or finer(problem, MOST, [pair[0].q]) is None]
+        log["optima_off_path"], found = len(found) - len(sent), sent
     log["jumping_optima"] = coarse.jumping + sum(fine.converged and not fine.continuous for fine in refined)
     if not found:
         why_not = no_optimum(problem, grids[0], starts, refined, coarse.jumping)
@@ -123,7 +127,7 @@ def by_differences(problem: Problem, options: GlobalOptions, context: Context) -
                 "global",
                 Trajectory(problem.times, fine.q),
                 Status.SOLVED,
-                _said(problem, asked, options, [fine.q for fine, _ in found]) if rank == 0 else "",
+                _said(problem, asked, options, [ranked[0].q]) if rank == 0 else "",
                 optimum=rank + 1,
                 tracking_tolerance=TRACKING,
                 limits_kept=LIMIT_KINDS,
@@ -169,6 +173,12 @@ global_planner = Method("global", "Planner's optimum", "#2F855A", GlobalOptions,
 
 def _good(optimum: Optimum) -> bool:
     return optimum.converged and optimum.continuous
+
+
+def _cheapest(optima: list[Optimum]) -> list[Array]:
+    """The motion of the best, if there is one."""
+    good = [optimum for optimum in optima if _good(optimum)]
+    return [min(good, key=lambda optimum: optimum.cost).q] if good else []
 
 
 def _said(problem: Problem, asked: int, options: GlobalOptions, motions: list[Array]) -> str:
@@ -271,7 +281,7 @@ def _to_the_end(
     then the one on these.
     """
     refined = _refine_all(problem, grids, options, optima, batch, context)
-    while (parted := finer(problem, options.refine_to, [fine.q for fine in refined if _good(fine)])) is not None:
+    while (parted := finer(problem, options.refine_to, _cheapest(refined))) is not None:
         problem, grids = replace(problem, times=parted), [*grids, parted]
         again = [fine for fine in refined if _good(fine)]
         batch = batch and Batch(problem, options)
