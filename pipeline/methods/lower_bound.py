@@ -107,8 +107,16 @@ def percent(gap: float) -> str:
 
 
 def refuses(problem: Problem, options: LowerBoundOptions) -> str | None:
-    """What Newton's method does not serve has no motion to hold a bound against; and cells know no obstacles."""
-    why = "obstacles" if problem.obstacles is not None else serve.why_not(problem)
+    """What the cells' costs and limits do not know, and grids on which Newton's method does not fold a cycle."""
+    bounds = problem.bounds
+    conditions = {
+        "obstacles": problem.obstacles is not None,
+        "a secondary criterion": problem.objective.secondary is not None,
+        "bounds on integrals": bool(problem.bounds_of_integrals),
+        "torque or power limits": bool(np.isfinite(bounds.torque).any() or np.isfinite(bounds.power).any()),
+        "so few intervals": len(problem.times) <= serve.FEWEST,
+    }
+    why = next((name for name, holds in conditions.items() if holds), None)
     return why and f"the problem has {why}; supported are limits of positions and velocities, and no other conditions"
 
 
