@@ -114,7 +114,7 @@ def refuses(problem: Problem, options: LowerBoundOptions) -> str | None:
         "a secondary criterion": problem.objective.secondary is not None,
         "bounds on integrals": bool(problem.bounds_of_integrals),
         "torque or power limits": bool(np.isfinite(bounds.torque).any() or np.isfinite(bounds.power).any()),
-        "so few intervals": len(problem.times) <= serve.FEWEST,
+        "so few intervals": len(problem.times) <= serve.FEWEST[False],
     }
     why = next((name for name, holds in conditions.items() if holds), None)
     return why and f"the problem has {why}; supported are limits of positions and velocities, and no other conditions"
