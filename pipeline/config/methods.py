@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal, get_args
 
 from pydantic import Field
 
-from pipeline.config.fields import Number, Whole, Words, schema
+from pipeline.config.fields import Number, Whole, WordOrWords, Words, schema
 from pipeline.config.goal import Integral, Positive
 
 MethodName = Literal[
@@ -100,10 +100,10 @@ class GlobalOptions:
     """The interpolation-based Global Kinematic Planner; counts as in its paper."""
 
     starts: Annotated[
-        Literal["roadmap", "population", "dynamic_programming", "both"],
+        WordOrWords[Literal["roadmap", "population", "dynamic_programming"]],
         Field(
-            description="where the solver starts from; population: as in the paper; dynamic_programming: r = 1; "
-            "both: these"
+            description="where the solver starts from, one or a list; population: as in the paper; "
+            "dynamic_programming: r = 1"
         ),
     ] = "roadmap"
     solver: Annotated[
@@ -136,6 +136,10 @@ class GlobalOptions:
     optimised: Annotated[
         Whole, Field(ge=1, le=MOST_STARTS, description="motions that are optimised on the coarsest grid")
     ] = 64
+    budget: Annotated[
+        Whole,
+        Field(ge=1, le=MOST_STARTS, description="starts at most, while the last half of them brought something new"),
+    ] = 1024
     limit_weight: Annotated[
         Number, Field(ge=0, description="k_L of eq. (14): distance from the joint limits in the ranking")
     ] = 0.01
@@ -159,6 +163,11 @@ class GlobalOptions:
     same_path: Annotated[
         Apart, Field(description="[rad] motions that differ by less at every knot, but for full turns, are one optimum")
     ] = 0.05
+
+    @property
+    def generators(self) -> tuple[str, ...]:
+        """The words of `starts`."""
+        return (self.starts,) if isinstance(self.starts, str) else self.starts
 
 
 @schema

@@ -32,6 +32,7 @@ from pipeline.search.roadmap import Roadmap
 from pipeline.search.selection import diverse
 
 TRACKING = 1e-8  # [m] what the motion keeps at every knot
+STARTS = 64
 ROUNDS = 16
 MOST_LINKS = 2_500_000  # between cells of neighbouring knots
 OPEN_ROUNDS = 2  # of a cyclic problem, before its ends are brought together
@@ -56,7 +57,7 @@ def solve(problem: Problem, options: LowerBoundOptions, context: Context) -> lis
     intervals = min(options.intervals or own, own)
     times = np.interp(np.linspace(0, own, intervals + 1), np.arange(own + 1), problem.times)
     here = replace(problem, times=times)
-    starts = Roadmap().starts(here, times, np.random.default_rng(context.seed))
+    starts = Roadmap(here, times, np.random.default_rng(context.seed)).cheapest(STARTS)
     first = _best(here, starts)
     if first is None:
         standing = np.tile(problem.q_init, (len(times), 1))
@@ -107,16 +108,13 @@ def percent(gap: float) -> str:
 
 
 def refuses(problem: Problem, options: LowerBoundOptions) -> str | None:
-    """What the cells' costs and limits do not know, and grids on which Newton's method does not fold a cycle."""
-    bounds = problem.bounds
-    conditions = {
-        "obstacles": problem.obstacles is not None,
-        "a secondary criterion": problem.objective.secondary is not None,
-        "bounds on integrals": bool(problem.bounds_of_integrals),
-        "torque or power limits": bool(np.isfinite(bounds.torque).any() or np.isfinite(bounds.power).any()),
-        "so few intervals": len(problem.times) <= serve.FEWEST[False],
-    }
-    why = next((name for name, holds in conditions.items() if holds), None)
+    """What Newton's method does not serve has no motion to hold a bound against; and cells know neither obstacles nor
+    forces.
+    """
+    limits = problem.bounds
+    forces = bool(np.isfinite(limits.torque).any() or np.isfinite(limits.power).any())
+    why = "obstacles" if problem.obstacles is not None else "torque or power limits" if forces else None
+    why = why or serve.why_not(problem)
     return why and f"the problem has {why}; supported are limits of positions and velocities, and no other conditions"
 
 

@@ -58,7 +58,7 @@ def make_problem(file: Path) -> Problem:
 def case() -> Case:
     """LSV, which meets a singularity, the planner's best and, to have two of one method, that again as its second."""
     problem = make_problem(ROBOT)
-    best = global_planner(problem, GlobalOptions(candidates=50, starts="both"))[0]
+    best = global_planner(problem, GlobalOptions(candidates=50, starts=["population", "dynamic_programming"]))[0]
     solutions = [lsv(problem, LsvOptions())[0], best, dataclasses.replace(best, optimum=2)]
     return problem, [evaluate(problem, solution) for solution in solutions]
 

@@ -19,9 +19,11 @@ from pipeline.build.problem import prepare
 from pipeline.common.arrays import Array
 from pipeline.config.methods import GlobalOptions
 from pipeline.methods.global_planner import optimum, planner
+from pipeline.methods.global_planner.basins import basins
 from pipeline.methods.global_planner.batch import Batch
 from pipeline.methods.global_planner.grids import refinement
 from pipeline.methods.global_planner.optimum import Optimum
+from pipeline.methods.global_planner.starts import Starts
 from pipeline.methods.method import Context
 from pipeline.problem.costs import objective_values
 from pipeline.problem.problem import Boundary, Problem
@@ -92,7 +94,7 @@ class Plan:
         usual = planner.STEPS_ALONE if self.alone else planner.STEPS
         self.grids = refinement(self.problem.times, self.options.coarse_steps or usual)
         begin = time.process_time()
-        self.motions, _ = planner._starts(self.problem, self.grids[0], self.options, np.random.default_rng(config.seed))
+        self.motions = Starts(self.problem, self.grids[0], self.options, np.random.default_rng(config.seed)).first
         self.drawn = time.process_time() - begin
         self.peer = Peer()
 
@@ -101,8 +103,8 @@ class Plan:
         problem, grids, options = self.problem, self.grids, self.options
         batch, context = None if self.alone else Batch(problem, options), Context()
         starts = planner._optimise_starts(problem, grids[0], options, self.motions, batch, context)
-        basins = [starts[index] for index in planner._basins(problem, starts, options)]
-        return self._kept(planner._refine_all(problem, grids, options, basins, batch, context))
+        chosen = basins(problem, grids[0], starts, options.same_path).optima
+        return self._kept(planner._refine_all(problem, grids, options, chosen, batch, context))
 
     def theirs(self) -> list[Optimum]:
         """The same steps, every solve by the peer."""
@@ -110,15 +112,15 @@ class Plan:
         first = optimum.first_order(problem)
         with mock.patch.object(optimum, "optimise", self.peer.optimise):
             starts = [self.peer.optimise(first, grids[0], motion, options) for motion in self.motions]
-            chosen = [starts[index] for index in planner._basins(problem, starts, options)]
+            chosen = basins(problem, grids[0], starts, options.same_path).optima
             if first is not problem:
                 starts = [optimum.go_on((problem, grids[0], options), start) for start in chosen]
-                chosen = [starts[index] for index in planner._basins(problem, starts, options)]
+                chosen = basins(problem, grids[0], starts, options.same_path).optima
             return self._kept([optimum.refine((problem, grids, options), start) for start in chosen])
 
     def _kept(self, fine: list[Optimum]) -> list[Optimum]:
         good = [one for one in fine if one.converged and one.continuous]
-        return [good[index] for index in planner._distinct(good, self.options, self.problem)]
+        return basins(self.problem, self.problem.times, good, self.options.same_path).optima
 
 
 def simulation(name: str, *words: str) -> None:

@@ -134,20 +134,20 @@ def test_a_run_calls_its_methods_in_order_with_their_own_options() -> None:
     assert all(second > 0 for second in seconds.values())
 
 
-@pytest.mark.parametrize("starts", ["dynamic_programming", "both"])
-def test_starts_by_dynamic_programming_serve_what_it_serves(starts: str) -> None:
+@pytest.mark.parametrize("starts", ["dynamic_programming", ["population", "dynamic_programming"]])
+def test_starts_by_dynamic_programming_serve_what_it_serves(starts: str | list[str]) -> None:
     options = GlobalOptions(starts=starts)
     assert METHODS["global"].why_not(prepare(asked("limits", "global")), options) is None
     for problem in ("torque", "floating", "r = 2"):
         line = METHODS["global"].why_not(prepare(asked(problem, "global")), options)
         assert line is not None
-        assert line.startswith(f"global: method.global.starts = {starts}: dynamic_programming: ")
+        assert line.startswith(f"global: method.global.starts = {', '.join(options.generators)}: dynamic_programming: ")
         assert line.endswith("; starts = roadmap serves every problem")
 
 
 def test_a_front_is_refused_where_the_planner_is_or_two_integrals_are_not_given() -> None:
     pareto, problem = METHODS["pareto"], prepare(asked("fixed", "pareto"))
-    by_grid = ParetoOptions(planner=GlobalOptions(starts="both"))
+    by_grid = ParetoOptions(planner=GlobalOptions(starts=["population", "dynamic_programming"]))
     line = pareto.why_not(problem, by_grid)
     assert line is not None
     assert "the objective holds a torque or reaction integral" in line

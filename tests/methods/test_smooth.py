@@ -12,11 +12,11 @@ from pipeline.common.errors import InputError
 from pipeline.config.methods import GlobalOptions
 from pipeline.evaluation.evaluation import evaluate
 from pipeline.methods.global_planner.planner import global_planner
-from pipeline.methods.global_planner.smooth import room
+from pipeline.methods.global_planner.smooth import room, unresolved
 from pipeline.methods.pareto import pareto
 from pipeline.problem.limits import Limits
 from pipeline.problem.objective import Objective
-from pipeline.problem.problem import Problem
+from pipeline.problem.problem import Boundary, Problem
 from pipeline.problem.solution import Status
 from pipeline.program.spline.curve import Curve
 from tests.support import composed, free_line
@@ -34,6 +34,18 @@ def test_rest_asks_for_a_spline_and_differences_refuse_it() -> None:
     with pytest.raises(InputError, match=r"^pareto: the joints are to rest at an end"):
         pareto(problem)
     assert global_planner(replace(problem, rest=(False, False)), FEW)[0].trajectory.ends is None
+
+
+def test_a_start_that_the_grid_does_not_show_is_said() -> None:
+    """An optimum that jumps to 0.5 rad/s takes 0.05 s to it at 10 rad/s^2: two steps of 0.1 s are too few, 50 do."""
+    problem = replace(free_line(10), boundary=Boundary.FIXED, rest=(True, True))
+    problem = replace(problem, limits=replace(Limits.none(3), acceleration=np.full(3, 10.0)))
+    motion = problem.q_init + 0.05 * np.arange(11)[:, None] * np.array([0.1, 1.0, 0.2])
+    said = unresolved(problem, motion)
+    assert "takes 0.05 s within limits.acceleration, less than two of 10 steps" in said
+    assert "timing.steps = 42 or" in said
+    assert unresolved(replace(problem, times=np.linspace(0.0, 1.0, 51)), np.repeat(motion, 5, axis=0)[:51]) == ""
+    assert unresolved(replace(problem, boundary=Boundary.FREE), motion) == ""
 
 
 def test_a_spline_is_judged_as_the_curve_that_it_is() -> None:

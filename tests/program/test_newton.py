@@ -10,6 +10,7 @@ import pytest
 from pipeline.build.problem import prepare
 from pipeline.common.arrays import Array
 from pipeline.model.clearance import Clearance
+from pipeline.model.kernel.chain import Chain
 from pipeline.problem.costs import integrals, objective_values, velocities
 from pipeline.problem.objective import Objective
 from pipeline.problem.problem import Boundary, Problem
@@ -19,6 +20,7 @@ from pipeline.program.newton.banded import Banded
 from pipeline.program.newton.bounds import Bounds
 from pipeline.program.newton.clear import Clear
 from pipeline.program.newton.knots import Knots
+from pipeline.program.newton.momentum import Momentum
 from pipeline.program.newton.newton import Newton
 from pipeline.program.newton.serve import Solver, why_not
 from pipeline.search.roadmap import Roadmap
@@ -50,12 +52,17 @@ def test_banded_systems(cyclic: bool, size: int, reach: int, rng: np.random.Gene
     off = [rng.normal(size=(2, count if cyclic else count - j, size, size)) for j in range(1, reach + 1)]
     blocks, right = (diagonal, *off), rng.normal(size=(2, count, size))
     band, knots = Banded(count, size, cyclic, reach), Knots(Boundary.CYCLIC if cyclic else Boundary.FIXED, np.arange(8))
-    x, changed = band.solve(band.assemble(blocks), np.empty(0), right)
+    x, _, changed = band.solve(band.assemble(blocks), np.empty(0), right)
     assert changed == 0
+    rows, target = rng.normal(size=(2, 4, count * size)), rng.normal(size=(2, 4))
+    tied, nu, _ = band.solve(band.assemble(blocks), np.empty(0), right, rows, target)
     for s in range(2):
         whole = dense(tuple(block[s] for block in blocks), cyclic)
         np.testing.assert_allclose(x[s].ravel(), np.linalg.solve(whole, right[s].ravel()), atol=1e-12)
         np.testing.assert_allclose(knots.product(blocks, right)[s].ravel(), whole @ right[s].ravel(), atol=1e-12)
+        both = np.block([[whole, rows[s].T], [rows[s], np.zeros((4, 4))]])
+        exact = np.linalg.solve(both, np.concatenate([right[s].ravel(), target[s]]))
+        np.testing.assert_allclose(np.concatenate([tied[s].ravel(), nu[s]]), exact, atol=1e-10)
 
 
 def test_an_indefinite_system_fades_into_a_positive_one(rng: np.random.Generator) -> None:
@@ -63,7 +70,7 @@ def test_an_indefinite_system_fades_into_a_positive_one(rng: np.random.Generator
     bad, good = -np.ones((1, 5, 1, 1)), 2 * np.ones((1, 5, 1, 1))
     off = np.zeros((1, 4, 1, 1))
     right = rng.normal(size=(1, 5, 1))
-    x, changed = band.solve(band.assemble((bad, off)), band.assemble((good, off)), right)
+    x, _, changed = band.solve(band.assemble((bad, off)), band.assemble((good, off)), right)
     assert changed == 1
     np.testing.assert_allclose(x, right / (0.4 * -1 + 0.6 * 2))
 
@@ -112,7 +119,7 @@ def test_derivatives_of_whole_motions(boundary: Boundary, rng: np.random.Generat
         np.testing.assert_allclose(point.gradient[s].ravel(), differences(cost, flat), atol=1e-7 * scale)
         hessian = dense(tuple(block[s] for block in point.hessian), knots.cyclic)
         np.testing.assert_allclose(hessian, differences(gradient, flat), atol=1e-7 * np.abs(hessian).max())
-    value, error, _ = motions.value(x, begin)
+    value, error, *_ = motions.value(x, begin)
     np.testing.assert_allclose(value, point.cost, rtol=1e-13)
     np.testing.assert_array_equal(error, point.error)
 
@@ -156,6 +163,7 @@ def test_rows_of_intervals_and_their_transpose(boundary: Boundary, reach: int, r
     d, z = rng.normal(size=(2, count, n)), rng.random((2, count, rows))
     np.testing.assert_allclose(stencils.change(knots, by, d), np.einsum("skrjn,sjn->skr", whole, d), atol=1e-12)
     np.testing.assert_allclose(stencils.pull(knots, by, z), np.einsum("skrjn,skr->sjn", whole, z), atol=1e-12)
+    np.testing.assert_array_equal(stencils.dense(knots, by), whole.reshape(2, count * rows, -1))
     squares = np.einsum("skria,skr,skrjb->siajb", whole, z, whole).reshape(2, count * n, -1)
     for s in range(2):
         found = dense(tuple(block[s] for block in stencils.weigh(knots, by, z)), knots.cyclic)
@@ -216,12 +224,35 @@ def test_derivatives_of_torques(boundary: Boundary, enters: str, rng: np.random.
     np.testing.assert_allclose(found, hessian, atol=1e-7 * np.abs(hessian).max())
 
 
+@pytest.mark.parametrize("name", ["floating3r", "floating_panda"])
+def test_momentum_rows_and_their_derivatives(name: str, rng: np.random.Generator) -> None:
+    """Values beside Drake's arm; derivatives by differences."""
+    problem = prepare(composed(f"+experiment={name}", "timing.steps=3"))
+    arm, knots = problem.task.arm, Knots(problem.boundary, problem.times)
+    rows = Momentum(arm, Chain.of(arm), knots)
+    q = problem.q_init + 0.2 * rng.normal(size=(1, 4, arm.n))
+    x, begin, dt = knots.unknown(q), knots.begin(q), np.diff(problem.times)
+    tie = rows.values(x, begin)
+    right = arm.base.mean_momentum_residual(arm, q[0, :-1], np.diff(q[0], axis=0) / dt[:, None], dt)[0]
+    np.testing.assert_allclose(tie[0], right, atol=1e-12)
+    nu = rng.normal(size=tie.shape)
+
+    def pull(flat: Array) -> Array:
+        return stencils.pull(knots, rows.differentiate(flat.reshape(x.shape), begin)[1], nu).ravel()
+
+    slope = differences(lambda flat: (rows.values(flat.reshape(x.shape), begin) * nu).sum(), x.ravel())
+    np.testing.assert_allclose(pull(x.ravel()), slope, atol=1e-7 * np.abs(slope).max())
+    hessian = differences(pull, x.ravel())
+    found = dense(tuple(block[0] for block in rows.curvature(x, begin, nu)), knots.cyclic)
+    np.testing.assert_allclose(found, hessian, atol=1e-7 * np.abs(hessian).max())
+
+
 def solved(*words: str) -> tuple[Problem, Newton, Array]:
     problem = prepare(composed(*words, "timing.steps=25"))
     return (
         problem,
         Solver(problem).on(problem.times),
-        Roadmap().starts(problem, problem.times, np.random.default_rng(1)),
+        Roadmap(problem, problem.times, np.random.default_rng(1)).cheapest(64),
     )
 
 
@@ -239,10 +270,11 @@ def test_ipopt_confirms_every_optimum(name: str) -> None:
         assert answer.residual[s] < 1e-9
 
 
+@pytest.mark.slow
 def test_ipopt_confirms_an_optimum_beside_an_obstacle() -> None:
     """Without the rows' curvature the last digits of the multipliers are IPOPT's to find."""
     problem = prepare(composed("+experiment=panda_obstacle", "timing.steps=12"))
-    starts = Roadmap(nodes=60, most=4).starts(problem, problem.times, np.random.default_rng(1))
+    starts = Roadmap(problem, problem.times, np.random.default_rng(1), nodes=60).cheapest(4)
     answer = Solver(problem).on(problem.times).solve(starts)
     assert answer.converged.sum() >= 2
     q = answer.q[np.flatnonzero(answer.converged)[np.argmin(answer.cost[answer.converged])]]
@@ -255,11 +287,26 @@ def test_ipopt_confirms_an_optimum_beside_an_obstacle() -> None:
     assert 0.0 <= clearance.min() - problem.obstacles.margin < 1e-3  # the obstacle is in the way; p is a smooth bound
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("words", [("base.angular_momentum=[0,0,0.02]",), ("limits=joint",)])
+def test_ipopt_confirms_optima_of_an_arm_that_floats(words: tuple[str, ...]) -> None:
+    problem = prepare(composed("+experiment=floating3r", "timing.steps=12", *words))
+    starts = Roadmap(nodes=60, most=4).starts(problem, problem.times, np.random.default_rng(1))
+    answer = Solver(problem).on(problem.times).solve(starts)
+    assert answer.converged.any()
+    q = answer.q[np.flatnonzero(answer.converged)[np.argmin(answer.cost[answer.converged])]]
+    told = confirm(problem, problem.times, q, tolerance=1e-8, max_iterations=20)
+    assert told.converged
+    assert told.iterations <= 2
+    assert told.moved < 1e-6
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["sim3", "sim4"])
 def test_ipopt_confirms_optima_of_torques(name: str) -> None:
     """Squares of torques, and in sim4 limits of torques and powers that matter."""
     problem = prepare(composed(f"+experiment={name}", "timing.steps=25"))
-    starts = Roadmap(nodes=100, most=4).starts(problem, problem.times, np.random.default_rng(1))
+    starts = Roadmap(problem, problem.times, np.random.default_rng(1), nodes=100).cheapest(4)
     answer = Solver(problem).on(problem.times).solve(starts)
     assert answer.converged.any()
     q = answer.q[np.flatnonzero(answer.converged)[np.argmin(answer.cost[answer.converged])]]
@@ -288,9 +335,10 @@ def test_limits_that_nothing_keeps_are_not_kept_silently() -> None:
 
 
 def test_what_is_not_served_has_a_reason() -> None:
-    for name in ("sim1", "sim4", "panda_obstacle"):
-        problem = prepare(composed(f"+experiment={name}"))
-        assert why_not(replace(problem, limits=None) if problem.obstacles else problem) is None
-    floating, obstacle = (prepare(composed(f"+experiment={name}")) for name in ("floating3r", "panda_obstacle"))
-    assert "base" in str(why_not(floating))
+    for name in ("sim4", "floating3r"):
+        assert why_not(prepare(composed(f"+experiment={name}"))) is None
+    obstacle = prepare(composed("+experiment=panda_obstacle"))
+    assert why_not(replace(obstacle, limits=None)) is None
     assert "obstacles and torques" in str(why_not(obstacle))
+    for words, word in ((("boundary=free",), "not fixed"), (("objective=base_rotation",), "rotation")):
+        assert word in str(why_not(prepare(composed("+experiment=floating3r", *words))))

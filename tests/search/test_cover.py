@@ -51,7 +51,7 @@ class Case:
 @pytest.fixture(scope="module", params=NAMES)
 def case(request: pytest.FixtureRequest) -> Case:
     problem = on_intervals(request.param)
-    starts = Roadmap(nodes=150).starts(problem, problem.times, np.random.default_rng(1))
+    starts = Roadmap(problem, problem.times, np.random.default_rng(1), nodes=150).cheapest(64)
     answer = Solver(problem).on(problem.times).solve(starts)
     good = answer.converged & (answer.residual < 1e-8)
     good &= np.abs(np.diff(answer.q, axis=1)).max(axis=(1, 2)) < LONGEST_STEP
@@ -169,7 +169,7 @@ def test_halves_cover_what_they_halve(case: Case) -> None:
 def test_prices_of_limits_that_do_not_hold_are_zero_and_the_others_have_the_sign_of_the_step() -> None:
     for name, held in (("free2", False), ("sim5", True)):
         problem = on_intervals(name)
-        starts = Roadmap(nodes=100).starts(problem, problem.times, np.random.default_rng(1))
+        starts = Roadmap(problem, problem.times, np.random.default_rng(1), nodes=100).cheapest(64)
         answer = Solver(problem).on(problem.times).solve(starts[:8])
         q = answer.q[np.where(answer.converged, answer.cost, np.inf).argmin()]
         price, step = prices(problem, problem.times, q), np.diff(q, axis=0)

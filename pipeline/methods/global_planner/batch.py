@@ -14,6 +14,7 @@ from pipeline.common.arrays import Array
 from pipeline.config.methods import GlobalOptions
 from pipeline.methods.global_planner.optimum import (
     STAYS,
+    STRAYED,
     Optimum,
     clear_between,
     first_order,
@@ -31,6 +32,7 @@ from pipeline.program.newton.serve import Solver, why_not
 
 ON_PATH = 1e-8  # [m, rad] at every knot
 JUMPS = 0.1  # of the path's length: an optimum that leaves it so far between coarse knots is not refined
+SMOOTH = 0.003  # of the path's length: an optimum that leaves it farther and is lost on a finer grid has jumped
 
 
 class Batch:
@@ -43,6 +45,11 @@ class Batch:
         self.alone = why_not(problem)
         self.solver = Solver(self.first)
         self.whole = self.solver if self.first is problem or self.alone else Solver(problem)
+
+    @property
+    def cheap(self) -> bool:
+        """Whether a start costs no more than its part of one batch."""
+        return self.first is self.problem and self.problem.obstacles is None
 
     @staticmethod
     def without(problem: Problem, options: GlobalOptions) -> str | None:
@@ -85,6 +92,8 @@ class Batch:
                 found = self._finer(first, on, fine, [optimum for _, optimum in part])
                 for (k, before), finer in zip(part, found, strict=True):
                     refined[k] = finer and replace(finer, solves=before.solves + finer.solves)
+                    if first and self._has_jumped(on, before, finer):
+                        refined[k] = replace(finer or before, continuous=False)
             on = fine
         return [optimum and self._finish(on, optimum) for optimum in refined]
 
@@ -108,8 +117,7 @@ class Batch:
 
     def _again(self, times: Array, first: Optimum) -> Optimum | None:
         """Where torque limits matter after all."""
-        (optimum,) = self.further(times, [first]) if first.converged else (None,)
-        return optimum and replace(optimum, solves=[*first.solves, *optimum.solves])
+        return self.further(times, [first])[0] if first.converged else None
 
     def _suffices(self, times: Array, optimum: Optimum) -> bool:
         """Whether an optimum without torques is one of the problem."""
@@ -118,6 +126,12 @@ class Batch:
             and not self.problem.objective.second_order
             and keeps_torque_limits(self.problem, times, optimum.q)
         )
+
+    def _has_jumped(self, on: Array, optimum: Optimum, finer: Optimum | None) -> bool:
+        """Whether an optimum on the knots `on` was one of that grid alone: a finer one lost it, or made it dear."""
+        if finer is None:
+            return not stays_on_path(self.problem, on, optimum.q, SMOOTH)
+        return finer.cost > STRAYED * optimum.cost
 
     def _whether_continuous(self, times: Array, optimum: Optimum, share: float) -> Optimum:
         return replace(optimum, continuous=stays_on_path(self.problem, times, optimum.q, share))
@@ -148,6 +162,7 @@ class Batch:
         )
         entry = {"solver": "ipopt", "intervals": len(times) - 1, "iterations": told.iterations, "moved": told.moved}
         entry |= {"wall_time_s": told.wall_time, "status": told.status}
+        entry |= {"violation": told.violation, "optimality": told.optimality}
         if told.converged:
             cost = float(objective_values(self.problem, times, told.q[None])[0])
             solves = [*optimum.solves, {**entry, "cost": cost}]

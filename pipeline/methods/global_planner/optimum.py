@@ -21,6 +21,7 @@ from pipeline.problem.objective import Objective
 from pipeline.problem.problem import Problem
 from pipeline.program.feasibility import violations
 from pipeline.program.ipopt import STOPPED
+from pipeline.program.residuals import residuals
 from pipeline.program.transcription import transcribe
 
 # What a coarse grid's optimum needs to be told apart and refined; only the last grid's is reported.
@@ -58,6 +59,17 @@ class Optimum:
     status: str
     continuous: bool = True  # False: between its knots the motion leaves the path, it jumps from branch to branch
     solves: list[dict[str, Any]] = field(default_factory=list)
+
+    @property
+    def evidence(self) -> str:
+        """What IPOPT says of it, on its last grid."""
+        told = next((solve for solve in reversed(self.solves) if "optimality" in solve), None)
+        if told is None:
+            return ""
+        return (
+            f"confirmed by IPOPT: constraints to {told['violation']:.0e}, optimality to {told['optimality']:.0e}, "
+            f"{told['iterations']} iteration{'' if told['iterations'] == 1 else 's'}"
+        )
 
     @property
     def final(self) -> bool:
@@ -166,6 +178,8 @@ def optimise(problem: Problem, times: Array, guess: Array, options: GlobalOption
         "status": outcome.status,
         "cost": cost,
     }
+    if last:
+        entry["violation"], entry["optimality"] = residuals(program.drake, outcome.result)
     return Optimum(q, cost, outcome.converged, outcome.status, solves=[entry])
 
 

@@ -15,7 +15,7 @@ from pipeline.common.arrays import Array
 from pipeline.config.methods import GlobalOptions
 from pipeline.methods.method import Context
 from pipeline.problem.limits import FREE, LIMIT_KINDS
-from pipeline.problem.problem import Problem
+from pipeline.problem.problem import Boundary, Problem
 from pipeline.problem.solution import Solution, Status, Trajectory
 from pipeline.program.spline.curve import Curve, objective
 from pipeline.program.spline.program import Solved, why_not
@@ -102,6 +102,34 @@ def rough(problem: Problem) -> Problem:
     return replace(problem, rest=(False, False), zero_acceleration=False, limits=limits)
 
 
+def freer(problem: Problem) -> Problem:
+    """The same without limits that a motion keeps if only it takes its time: to start from where none are kept."""
+    free = np.full(problem.task.arm.n, np.inf)
+    loose = without_forces(rough(problem))
+    return replace(loose, limits=replace(loose.bounds, velocity=free))
+
+
+def unresolved(problem: Problem, motion: Array) -> str:
+    """That the grid is too coarse for the start from rest, and which would do; nothing where it is not.
+
+    Within the limits of acceleration the joints take some time to the speed at which the optimum by differences,
+    `motion`, jumps off: two steps are needed to see it.
+    """
+    bounds, times = problem.bounds, problem.times
+    if not (problem.rest[0] and problem.boundary is Boundary.FIXED) or problem.objective.second_order:
+        return ""
+    jump = np.abs(motion[1] - motion[0]) / (times[1] - times[0])
+    takes, steps = float((jump / bounds.acceleration).max()), len(times) - 1
+    needed = 2 * problem.reference.duration / takes if takes > 0 else 0.0
+    if needed <= steps or takes == 0:
+        return ""
+    enough = float(f"{1.05 * needed:.1e}")
+    return (
+        f"the start from rest takes {takes:.2g} s within limits.acceleration, less than two of {steps} steps, and its "
+        f"energy depends on the grid a little: timing.steps = {enough:.0f} or a smaller limit shows it"
+    )
+
+
 def smooth(problem: Problem, found: list[Solution], options: GlobalOptions, context: Context) -> list[Solution]:
     """The distinct optima among the splines, best first; or one solution that says what stands against any."""
     motions = [solution.trajectory.q for solution in found if solution.found]
@@ -129,6 +157,7 @@ def smooth(problem: Problem, found: list[Solution], options: GlobalOptions, cont
                 "global",
                 Trajectory(problem.times, own.curve.q, own.curve.ends),
                 Status.SOLVED,
+                "; ".join(filter(None, [found[0].message, unresolved(problem, motions[0])])) if rank == 0 else "",
                 optimum=rank + 1,
                 tracking_tolerance=problem.reference.tolerance if problem.zero_acceleration else TRACKING,
                 limits_kept=LIMIT_KINDS,

@@ -21,6 +21,7 @@ from pipeline.model.task import Task
 from pipeline.problem.objective import Objective
 from pipeline.program.newton import triangular
 from pipeline.program.newton.knots import Blocks, Knots
+from pipeline.program.newton.momentum import LOOSE, Ties
 from pipeline.program.newton.stencils import By
 
 
@@ -47,7 +48,8 @@ def _each(value: Any, change: Any) -> Any:
 class Point(PerStart):
     """At unknowns x (S, U, n): cost (S,), gradient (S, U, n), blocks of the Hessian and of the stiffness M/dt alone,
     error (S, U, m); J' = Y R with null space Z; columns for the curvature of the path (`rows.py`); kept (S, U, R), what
-    must not be negative (`Terms`), and its derivatives by (`stencils.py`).
+    must not be negative (`Terms`), and its derivatives by (`stencils.py`); tie (S, U, T), what must be zero besides,
+    and its derivatives tied.
     """
 
     cost: Array
@@ -61,6 +63,8 @@ class Point(PerStart):
     columns: tuple[Array, ...]
     kept: Array
     by: By
+    tie: Array
+    tied: By
 
 
 class Terms(Protocol):
@@ -102,12 +106,20 @@ NOTHING = Nothing()
 
 
 class Motions:
-    """Motions of one task on one grid; `terms`: what counts besides energy and path."""
+    """Motions of one task on one grid; `terms`: what counts besides energy and path, `ties`: what is zero besides."""
 
     def __init__(
-        self, chain: Chain, task: Task, objective: Objective, knots: Knots, x_ref: Array, terms: Terms = NOTHING
+        self,
+        chain: Chain,
+        task: Task,
+        objective: Objective,
+        knots: Knots,
+        x_ref: Array,
+        terms: Terms = NOTHING,
+        ties: Ties = LOOSE,
     ) -> None:
         self.chain, self.knots, self.rows, self.terms = chain, knots, TaskRows(chain, task), terms
+        self.ties, self.counted = ties, np.where(np.arange(chain.n) < task.arm.base.count, 0.0, 1.0)
         self.n, self.m = chain.n, task.m
         self.inertia, self.norm = objective.weight("kinetic_energy"), objective.weight("velocity_norm")
         self.target = x_ref[knots.first : knots.first + knots.count]
@@ -117,17 +129,17 @@ class Motions:
         qd = self.knots.steps(x, begin) / self.knots.dt[:, None]
         return x.reshape(-1, self.n), qd.reshape(-1, self.n), np.tile(self.target, (len(x), 1))
 
-    def value(self, x: Array, begin: Array) -> tuple[Array, Array, Array]:
-        """Cost (S,), path error (S, U, m), what is kept (S, U, R)."""
+    def value(self, x: Array, begin: Array) -> tuple[Array, Array, Array, Array]:
+        """Cost (S,), path error (S, U, m), what is kept (S, U, R) and what is tied (S, U, T)."""
         q, qd, target = self._flat(x, begin)
         at = self.chain.places(q)
-        value = self.norm * (qd * qd).sum(axis=1)
+        value = self.norm * (qd * qd) @ self.counted
         if self.inertia:
             value = value + self.inertia * energy(self.chain, q, qd, second=False, at=at).value
         error = self.rows.error(at, target)
         cost = value.reshape(len(x), -1) @ self.knots.weight
         share, kept = self.terms.values(x, begin)
-        return cost + share, error.reshape(len(x), -1, self.m), kept
+        return cost + share, error.reshape(len(x), -1, self.m), kept, self.ties.values(x, begin)
 
     def differentiate(self, x: Array, begin: Array) -> Point:
         """Everything at x (S, U, n)."""
@@ -144,6 +156,7 @@ class Motions:
         R, Q_of_rows = triangular.split(np.ascontiguousarray(found.jacobian.transpose(2, 1, 0)))
         basis = np.ascontiguousarray(Q_of_rows.transpose(2, 0, 1)).reshape(S, U, n, n)
         share, slope, more, kept, by = self.terms.differentiate(x, begin)
+        tie, tied = self.ties.differentiate(x, begin)
         curved = knots.spread(weight[:, :, None] * Q + P + P.swapaxes(-1, -2) + stiff, stiff)
         return Point(
             cost=value.reshape(S, U) @ knots.weight + share,
@@ -157,21 +170,23 @@ class Motions:
             columns=tuple(a.reshape(S, U, n, 3) for a in found.columns),
             kept=kept,
             by=by,
+            tie=tie,
+            tied=tied,
         )
 
     def _lagrangian(self, q: Array, qd: Array, at: Places) -> tuple[Array, ...]:
         """L (K,), dL/dq, dL/dqd (K, n), M, P, Q (K, n, n)."""
         if not self.inertia:
             zero, none = np.zeros_like(q), np.zeros((*q.shape, self.n))
-            norm = none + 2 * self.norm * np.eye(self.n)
-            return self.norm * (qd * qd).sum(axis=1), zero, 2 * self.norm * qd, norm, none, none
+            norm = none + 2 * self.norm * np.diag(self.counted)
+            return self.norm * (qd * qd) @ self.counted, zero, 2 * self.norm * qd * self.counted, norm, none, none
         found = energy(self.chain, q, qd, at=at)
         parts = (found.value, found.by_q, found.by_qd, found.mass, found.mixed, found.by_q_q)
         if self.inertia == 1.0 and not self.norm:
             return parts
         value, by_q, by_qd, M, P, Q = (self.inertia * part for part in parts)
-        value, by_qd = value + self.norm * (qd * qd).sum(axis=1), by_qd + 2 * self.norm * qd
-        return value, by_q, by_qd, M + 2 * self.norm * np.eye(self.n), P, Q
+        value, by_qd = value + self.norm * (qd * qd) @ self.counted, by_qd + 2 * self.norm * qd * self.counted
+        return value, by_q, by_qd, M + 2 * self.norm * np.diag(self.counted), P, Q
 
     @property
     def reach(self) -> int:

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from pipeline.common.arrays import Array
 from pipeline.problem.limits import Limits
-from pipeline.program.newton import triangular
+from pipeline.program.newton import stencils, triangular
 from pipeline.program.newton.banded import Banded
 from pipeline.program.newton.bounds import Bounds
 from pipeline.program.newton.inequalities import Inequalities
@@ -82,6 +82,7 @@ class State(PerStart):
     excess: Array
     z: Array
     mu: Array
+    nu: Array
     seen_theta: Array
     seen_phi: Array
     short: NDArray[np.int_]
@@ -104,6 +105,7 @@ class Step(PerStart):
     slack: Array
     excess: Array
     z: Array
+    nu: Array
     decrement: Array
     slope: Array
     theta: Array
@@ -146,7 +148,7 @@ class Newton:
                 who = state.number[finished]
                 answer.q[who] = self.knots.whole(state.x, state.begin)[finished]
                 answer.cost[who], answer.iterations[who] = state.point.cost[finished], iteration
-                answer.residual[who] = np.abs(state.point.error[finished]).max(axis=(1, 2))
+                answer.residual[who] = self._missed(state.point)[finished]
                 answer.converged[who] = (done & ~lost)[finished]
                 if finished.all():
                     break
@@ -169,6 +171,7 @@ class Newton:
             excess=np.maximum(slack - kept, mu[:, None] / (self.limits.penalty - z)),
             z=z,
             mu=mu,
+            nu=np.zeros_like(point.tie),
             seen_theta=empty,
             seen_phi=empty.copy(),
             short=np.zeros(count, int),
@@ -178,18 +181,21 @@ class Newton:
     # --- the direction ------------------------------------------------------------------------------------------
 
     def _direction(self, state: State) -> Step:
-        point, limits, knots = state.point, self.limits, self.knots
+        point, limits, knots, ties = state.point, self.limits, self.knots, self.motions.ties
         scale, mu = state.scale[:, None, None], state.mu[:, None]
         YT, ZT = point.Y.swapaxes(-1, -2), point.Z.swapaxes(-1, -2)
         gradient = point.gradient * scale
         lack = self._lack(state) if limits else state.slack
         towards = gradient - limits.pull(point.by, state.z) if limits else gradient
+        if ties.count:
+            towards = towards + stencils.pull(knots, point.tied, state.nu)
         multipliers = triangular.backward(point.R, -(YT @ towards[..., None])[..., 0])
         hessian, stiff = (tuple(a * scale[..., None] for a in blocks) for blocks in (point.hessian, point.stiff))
         hessian[0][:] += self.motions.curvature(point, multipliers)
         more = self.motions.terms.curvature(state.x, state.begin, limits.of_rows(state.z), state.scale)
-        for block, bent in zip(hessian, more, strict=False):
-            block[:] += bent
+        for bends in (more, ties.curvature(state.x, state.begin, state.nu)):
+            for block, bent in zip(hessian, bends, strict=False):
+                block[:] += bent
         driven = gradient
         if limits:
             other = limits.penalty - state.z
@@ -199,9 +205,9 @@ class Newton:
             driven = gradient - limits.pull(point.by, state.z - sigma * off_centre)
         onto = -(point.Y @ triangular.forward(point.R, point.error)[..., None])[..., 0]
         right = -(ZT @ (driven + knots.product(hessian, onto))[..., None])[..., 0]
-        within = self._reduced(point.Z, hessian, stiff, right)
+        within, nu, pulled = self._reduced(point, hessian, stiff, right, onto)
         d = onto + (point.Z @ within[..., None])[..., 0]
-        theta = np.abs(point.error).sum(axis=(1, 2))
+        theta = np.abs(point.error).sum(axis=(1, 2)) + np.abs(point.tie).sum(axis=(1, 2))
         slope, phi = (gradient * d).sum(axis=(1, 2)), point.cost * state.scale
         slack_step = excess_step = z_step = state.slack
         if limits:
@@ -212,8 +218,8 @@ class Newton:
             phi = phi + self._barrier(state.slack, state.excess, state.mu)
             slope = slope - state.mu * (slack_step / state.slack + excess_step / state.excess).sum(axis=1)
             slope = slope + excess_step @ limits.penalty
-        decrement = np.abs((right * within).sum(axis=(1, 2)))
-        return Step(d, slack_step, excess_step, z_step, decrement, slope, theta, phi)
+        decrement = np.abs(((right - pulled) * within).sum(axis=(1, 2)))
+        return Step(d, slack_step, excess_step, z_step, nu, decrement, slope, theta, phi)
 
     def _lack(self, state: State) -> Array:
         return self.limits.values(state.x, state.begin, state.point.kept) + state.excess - state.slack
@@ -221,21 +227,34 @@ class Newton:
     def _barrier(self, slack: Array, excess: Array, mu: Array) -> Array:
         return np.asarray(excess @ self.limits.penalty - mu * (np.log(slack) + np.log(excess)).sum(axis=1))
 
-    def _reduced(self, Z: Array, blocks: Blocks, stiff: Blocks, right: Array) -> Array:
-        """The step (S, U, r) in the null spaces."""
-        matrices = self.band.assemble(self.knots.reduce(Z, blocks))
-        positive = self.band.assemble(self.knots.reduce(Z, stiff))
+    def _reduced(self, point: Point, blocks: Blocks, stiff: Blocks, right: Array, onto: Array) -> tuple[Array, ...]:
+        """The step (S, U, r) in the null spaces, the ties' multipliers (S, U, T) and their pull on it (S, U, r)."""
+        matrices = self.band.assemble(self.knots.reduce(point.Z, blocks))
+        positive = self.band.assemble(self.knots.reduce(point.Z, stiff))
         # Where nothing holds the start, a uniform motion costs the stiffness nothing.
         positive[:, :, -1] += 1e-4 * positive[:, :, -1].mean(axis=1, keepdims=True)
-        return self.band.solve(matrices, positive, right)[0]
+        if not self.motions.ties.count:
+            within = self.band.solve(matrices, positive, right)[0]
+            return within, point.tie, np.zeros(())
+        target = -(point.tie + stencils.change(self.knots, point.tied, onto))
+        reduced = tuple(g @ self.knots.before(point.Z, s) for s, g in enumerate(point.tied))
+        rows = stencils.dense(self.knots, reduced)
+        within, nu, _ = self.band.solve(matrices, positive, right, rows, target.reshape(len(right), -1))
+        nu = nu.reshape(point.tie.shape)
+        return within, nu, stencils.pull(self.knots, reduced, nu)
 
     def _converged(self, state: State, step: Step, tolerance: float) -> NDArray[np.bool_]:
-        done = (step.decrement < tolerance) & (np.abs(state.point.error).max(axis=(1, 2)) < ON_PATH)
+        done = (step.decrement < tolerance) & (self._missed(state.point) < ON_PATH)
         if self.limits:
             gap = np.abs(state.slack * state.z - state.mu[:, None]).max(axis=1)
             lack = np.maximum(np.abs(self._lack(state)), state.excess).max(axis=1)
             done &= (gap < COMPLEMENTARITY * BARRIER_END) & (state.mu <= BARRIER_END) & (lack < FEASIBLE)
         return done
+
+    @staticmethod
+    def _missed(point: Point) -> Array:
+        """The largest error (S,) of the path and of ties."""
+        return np.maximum(np.abs(point.error).max(axis=(1, 2)), np.abs(point.tie).max(axis=(1, 2), initial=0.0))
 
     def _infeasible(self, state: State, step: Step, tolerance: float) -> NDArray[np.bool_]:
         beyond = state.excess.max(axis=1, initial=0.0) > BEYOND
@@ -255,7 +274,7 @@ class Newton:
         alpha = np.where(np.isfinite(alpha), alpha, 0.0)
         trial = state.x + alpha[:, None, None] * step.d
         point = self.motions.differentiate(trial, state.begin)
-        refused = self._refused(state, step, alpha, trial, point.cost, point.error, point.kept) & ~last
+        refused = self._refused(state, step, alpha, trial, point.cost, point.error, point.kept, point.tie) & ~last
         searched = bad = np.flatnonzero(refused)
         for _ in range(TRIALS):
             if not len(bad):
@@ -271,6 +290,7 @@ class Newton:
         if len(searched):
             point.put(searched, self.motions.differentiate(trial[searched], state.begin[searched]))
         slack, excess, z, mu = state.slack, state.excess, state.z, state.mu
+        nu = state.nu + alpha[:, None, None] * (step.nu - state.nu)
         theta, phi = state.seen_theta, state.seen_phi
         oldest = np.where(step.theta > FEASIBLE, step.theta, np.inf)
         theta, phi = np.roll(theta, 1, axis=1), np.roll(phi, 1, axis=1)
@@ -285,18 +305,19 @@ class Newton:
                 1e-10 * mu[:, None] / slack,
                 np.minimum(1e10 * mu[:, None] / slack, (1 - 1e-12) * self.limits.penalty),
             )
-            near = np.abs(state.point.error).max(axis=(1, 2)) < 1e-4
+            near = self._missed(state.point) < 1e-4
             solved = (step.decrement < 10 * mu) & near & (alpha > 0.3)
             mu = np.where(solved, np.maximum(BARRIER_END, np.minimum(0.1 * mu, mu**1.7)), mu)
             theta[mu < state.mu] = np.inf  # another barrier, another filter
         short = np.where(alpha < SHORT, state.short + 1, 0)
-        return State(state.number, trial, state.begin, state.scale, slack, excess, z, mu, theta, phi, short, point)
+        return State(state.number, trial, state.begin, state.scale, slack, excess, z, mu, nu, theta, phi, short, point)
 
     def _refused(
-        self, state: State, step: Step, alpha: Array, trial: Array, cost: Array, error: Array, kept: Array
+        self, state: State, step: Step, alpha: Array, trial: Array, cost: Array, error: Array, *others: Array
     ) -> NDArray[Any]:
         """Whether a trial neither lowers cost nor what is missed, against the iterate and against its filter."""
-        theta, phi = np.abs(error).sum(axis=(1, 2)), cost * state.scale
+        kept, tie = others
+        theta, phi = np.abs(error).sum(axis=(1, 2)) + np.abs(tie).sum(axis=(1, 2)), cost * state.scale
         if self.limits:
             slack, excess = (
                 a + alpha[:, None] * b for a, b in ((state.slack, step.slack), (state.excess, step.excess))

@@ -7,10 +7,11 @@ import numpy as np
 from pipeline.common.arrays import Array
 from pipeline.model.clearance import Clearance
 from pipeline.model.kernel.chain import Chain
-from pipeline.problem.problem import Problem
+from pipeline.problem.problem import Boundary, Problem
 from pipeline.program.newton.clear import Clear
 from pipeline.program.newton.forces import Forces
 from pipeline.program.newton.knots import Knots
+from pipeline.program.newton.momentum import LOOSE, Momentum, Ties
 from pipeline.program.newton.motion import NOTHING, Motions, Terms
 from pipeline.program.newton.newton import Newton
 
@@ -26,7 +27,7 @@ def why_not(problem: Problem) -> str | None:
     """
     objective = problem.objective
     reasons = {
-        "a base that moves or is held": problem.task.arm.base.count > 0,
+        **_about_base(problem),
         "reactions in the objective": objective.second_order and not objective.weight("torque"),
         "a secondary criterion": objective.secondary is not None,
         "neither velocities nor torques in the objective": not any(map(objective.weight, SERVED)),
@@ -36,6 +37,20 @@ def why_not(problem: Problem) -> str | None:
         "so few intervals": len(problem.times) <= FEWEST[_torques(problem)],
     }
     return next((reason for reason, holds in reasons.items() if holds), None)
+
+
+def _about_base(problem: Problem) -> dict[str, bool]:
+    """What is not served of an arm whose base has coordinates: its momentum from a given start is."""
+    base, objective = problem.task.arm.base, problem.objective
+    moves = base.count > 0
+    return {
+        "a base that is held": base.kind == "held",
+        "a base that moves, from a start that is not fixed": moves and problem.boundary is not Boundary.FIXED,
+        "a base that moves, and its rotation": moves and objective.weight("base_rotation") > 0,
+        "a base that moves, and torques": moves and _torques(problem),
+        "a base that moves, and limits of its attitude": moves and bool(np.isfinite(problem.bounds.attitude)),
+        "a base that moves, and velocities without energy": moves and not objective.weight("kinetic_energy"),
+    }
 
 
 def _torques(problem: Problem) -> bool:
@@ -61,4 +76,9 @@ class Solver:
             terms = Clear(self.clearance.rows(keep_off))
         elif _torques(problem):
             terms = Forces(self.chain, problem, knots)
-        return Newton(Motions(self.chain, problem.task, problem.objective, knots, x_ref, terms), problem.bounds)
+        arm = problem.task.arm
+        ties: Ties = LOOSE
+        if arm.base.kind == "floating":
+            ties = Momentum(arm, self.chain, knots)
+        motions = Motions(self.chain, problem.task, problem.objective, knots, x_ref, terms, ties)
+        return Newton(motions, problem.bounds)
