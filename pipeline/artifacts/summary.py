@@ -141,6 +141,7 @@ def _row(problem: Problem, e: Evaluation) -> dict[str, Any]:
         "optimum": e.solution.optimum,
         "status": e.status.word,
         "message": e.message,
+        "evidence": e.solution.evidence,
         "kinetic_energy_integral": e.energy_integral[-1],
         "torque_integral": e.torque_integral[-1],
         "kinetic_energy_integral_spline": e.energy_integral_spline,

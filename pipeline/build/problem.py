@@ -9,6 +9,7 @@ from pipeline.build.path import make_knots, make_reference, make_task
 from pipeline.build.rest import check_rest
 from pipeline.build.robot import initial, load
 from pipeline.config.run import RunConfig
+from pipeline.config.steps import refuse_endless
 from pipeline.problem.problem import Boundary, Problem
 from pipeline.robot.limits import require_held_within
 
@@ -22,6 +23,8 @@ def prepare(config: RunConfig) -> Problem:
     task = make_task(robot, arm)
     q_init = initial(robot, arm)
     reference, q_init = make_reference(config.path, config.timing, task, q_init)
+    if config.timing.law == "from_file":
+        refuse_endless(config, reference.duration, "path.file, which takes ")
     problem = Problem(
         task,
         reference,

@@ -14,7 +14,6 @@ import time
 from collections.abc import Callable, Generator, Sequence
 from contextlib import closing
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -36,7 +35,7 @@ Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 
-LOOK_EVERY = 0.5  # [s], at its parent: a worker
+LOOK_EVERY = 0.2  # [s], at its parent: a worker
 
 
 @dataclass(frozen=True)
@@ -102,9 +101,10 @@ def _here(count: int, function: Any, context: Any, work: list[tuple[Path | None,
         return
     given, restarted = 0, False
     while given < len(work):
-        jobs = (delayed(_in_a_worker)(os.getpid(), function, context, item, file) for file, item in work[given:])
+        jobs = (delayed(_in_a_worker)(function, context, item, file) for file, item in work[given:])
+        ours = {"initializer": _follow, "initargs": (os.getpid(),)}
         try:
-            with parallel_config(backend="loky", inner_max_num_threads=1):
+            with parallel_config(backend="loky", inner_max_num_threads=1, **ours):
                 for result in Parallel(n_jobs=count, return_as="generator", batch_size=1)(jobs):
                     yield result
                     given += 1
@@ -117,15 +117,13 @@ def _here(count: int, function: Any, context: Any, work: list[tuple[Path | None,
             restarted = True
 
 
-def _in_a_worker(parent: int, function: Any, context: Any, item: Any, file: Path | None) -> Any:
-    _follow(parent)
+def _in_a_worker(function: Any, context: Any, item: Any, file: Path | None) -> Any:
     found = _load(file)  # a pool that was started again has some results already
     return found[0] if found else _one(function, context, item, file)
 
 
-@cache
 def _follow(parent: int) -> None:
-    """End this process soon after the one that gives it work, however that ended: nobody waits for what it does."""
+    """End this process soon after the one that gives it work, however that ended, and before it gives any too."""
 
     def watch() -> None:
         while os.getppid() == parent:

@@ -11,7 +11,7 @@ from pipeline.problem.curve import whole
 from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Trajectory
 
-INNER = 4  # sub-intervals per knot interval at which the curve is held against its path
+INNER = 8  # sub-intervals per knot interval at which the curve is held against its path
 
 
 @dataclass(frozen=True)

@@ -52,6 +52,7 @@ class Solution:
     `limits_kept` are the kinds of limits that it promises to keep at its knots.
     `knots_only`: it goes from node to node of a grid, and promises nothing of the path between its knots.
     `grid` is the key of the configuration that its knots come from.
+    `evidence`: what speaks for the motion, in words: how it was found and what confirms it.
     `found` is False where there is no motion to speak of: the trajectory then only holds the arm at its start.
     """
 
@@ -67,6 +68,7 @@ class Solution:
     found: bool = True
     knots_only: bool = False
     grid: str = "timing.steps"
+    evidence: str = ""
     statistics: dict[str, Any] = field(default_factory=dict)
 
     def to_frame(self) -> pd.DataFrame:

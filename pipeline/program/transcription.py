@@ -14,6 +14,7 @@ returns at once where it does not apply. It comes after the terms whose unknowns
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
+from weakref import proxy
 
 from pipeline.common.arrays import Array
 from pipeline.problem.problem import Problem
@@ -51,5 +52,5 @@ def transcribe(
     """
     program = Program(problem, times, guess, elastic=elastic, keep_off=keep_off)
     for term in TERMS:
-        term(program)
+        term(proxy(program))  # what a term gives to Drake must not keep us alive: Python sees no circle through Drake
     return program

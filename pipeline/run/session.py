@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hydra.core.override_parser.overrides_parser import OverridesParser
+from hydra.core.utils import JobReturn
 from hydra.experimental.callback import Callback
 from omegaconf import DictConfig, OmegaConf
 
@@ -70,6 +71,10 @@ class Session(Callback):
             if mark.is_file() and mark.read_text(encoding="utf-8") == self.sweep:
                 raise OutputError(f"{mark.parent}: {SHARED}")
             mark.write_text(self.sweep, encoding="utf-8")
+
+    def on_job_end(self, config: DictConfig, job_return: JobReturn, **_: Any) -> None:
+        """Hydra keeps what every job of a sweep returns to its end: not the whole configuration too."""
+        job_return.cfg = job_return.hydra_cfg = None
 
     def on_multirun_end(self, config: DictConfig, **_: Any) -> None:
         """Put the summaries of all runs of the sweep into one table; the worst of their exit codes is the sweep's."""

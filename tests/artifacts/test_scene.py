@@ -19,6 +19,8 @@ from tests.once import made_once
 from tests.support import FEW_STARTS, composed
 
 SMALL = (
+    "method.global.refine_to=null",
+    "method.global.starts=population",
     *FEW_STARTS,
     "timing.steps=20",
     "method.global.optimised=2",
@@ -100,6 +102,8 @@ def test_front_of_rotation_against_energy(tmp_path: Path) -> None:
     """The trade that the PMKE paper names: at least ten points, none dominated, each bound met."""
     words = (
         *FEW_STARTS,
+        "method.global.refine_to=null",
+        "method.global.starts=population",
         "timing.steps=16",
         "method.global.optimised=2",
         "method.pareto.steps=6",

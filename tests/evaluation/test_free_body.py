@@ -184,8 +184,7 @@ def test_cycles_in_space(orientation: str) -> None:
         "timing.duration=4",
         "timing.steps=24",
         BETWEEN,
-        "method.global.candidates=40",
-        "method.global.optimised=2",
+        *(f"method.global.{word}" for word in ("starts=population", "refine_to=null", "candidates=40", "optimised=2")),
     )[1]
     assert e.status is Status.SOLVED, e.message
     assert np.abs(e.q[-1] - e.q[0]).max() < 1e-9

@@ -153,7 +153,7 @@ def test_statistics_tell_how_the_optima_were_found() -> None:
     _, motions = solved("+experiment=sim2", *FEW)
     log = motions[0].solution.statistics
     assert log["grids"] == [12, 25, 50, 100]
-    assert len(log["starts"]) <= 12
+    assert len(log["starts"]) == 24  # twelve, and as many that brought nothing new
     members = [motion.solution.statistics["starts_in_basin"] for motion in motions]
     assert all(count >= 1 for count in members)
     assert sum(members) <= sum(start["converged"] for start in log["starts"])
@@ -319,7 +319,7 @@ def test_progress_counts_every_start_and_never_gets_worse() -> None:
     context = Context(progress=lambda done, total, best: said.append((done, total, best)))
     solutions = global_planner(prepare(config), config.method.global_, context)
     assert [done for done, _, _ in said] == list(range(1, len(said) + 1))
-    assert {total for _, total, _ in said} == {len(said)}
+    assert all(done <= total <= len(said) for done, total, _ in said)
     best = [cost for _, _, cost in said]
     assert best == sorted(best, reverse=True)
     starts = solutions[0].statistics["starts"]

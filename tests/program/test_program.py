@@ -1,6 +1,8 @@
 from __future__ import annotations
 
+import gc
 import re
+import weakref
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -214,3 +216,19 @@ def test_running_out_of_time_is_called_so(made: Program) -> None:
     _, outcome, _ = made.solve(max_time=1e-6)
     assert not outcome.converged
     assert "time" in outcome.status
+
+
+@pytest.mark.parametrize("elastic", [(), ("velocity",)])
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_program_is_gone_when_nobody_has_it(kind: str, elastic: tuple[str, ...], problem: Make, guess: Guess) -> None:
+    """What it has given to Drake must not hold it, and with it the arm and its plants, for the whole process."""
+    changes = {key: value for key, value in KINDS[kind].items() if key != "timing"}
+    asked = replace(
+        problem(3, 11), bounds_of_integrals={} if elastic else {"velocity_norm": 1.0, "torque": 1.0}, **changes
+    )
+    made = transcribe(asked, asked.times, guess(asked), elastic=elastic)
+    made.solve(max_iterations=1)
+    gone = weakref.ref(made)
+    del made
+    gc.collect()
+    assert gone() is None

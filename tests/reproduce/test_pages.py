@@ -131,8 +131,9 @@ def reproduce_here(
 
 @pytest.mark.slow
 def test_a_line_per_experiment_and_nothing_twice(
-    reproduce_here: Callable[..., tuple[int, str, str]], tmp_path: Path
+    reproduce_here: Callable[..., tuple[int, str, str]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(reproduction_pages, "_figure", lambda *_: "")  # drawn by the tests above
     words = ("pontryagin", "methods=[pontryagin_as_printed]", "timing.steps=50")
     code, out, error = reproduce_here(*words)
     assert (code, error) == (0, "")

@@ -2,73 +2,34 @@
 
 from __future__ import annotations
 
+import gc
 import os
-import re
 import signal
-import subprocess
-import sys
-import time
 from functools import cache
 from pathlib import Path
 
-import pandas as pd
 import pytest
+from omegaconf import DictConfig
 
-from pipeline.run.ownership import LOCK
+from pipeline.model.arm import Arm
+from pipeline.run import main
 from pipeline.run.run import UNFINISHED
 from tests.commands import call
+from tests.endings import GONE, SAID, WHAT, assert_same, begin, end, placed, session, strays
 from tests.reports import leave_out_pictures
-from tests.support import ROOT
+from tests.support import FEW_STARTS
 from tests.tasks import kept, wait_until
 
 pytestmark = pytest.mark.slow
-
-SIZES = ("configurations=8", "candidates=60", "optimised=8", "solver=ipopt", "starts=population", "coarse_steps=12")
-PLAN = ("+experiment=sim1", "methods=[global]", "timing.steps=26", *(f"method.global.{size}" for size in SIZES))
-FRONT = ("+experiment=pareto", "timing.steps=20", "method.pareto.steps=4", *(f"method.global.{size}" for size in SIZES))
-GONE = 2.0  # [s] by when every process has left
-
-
-def begin(*words: str, cwd: Path) -> subprocess.Popen[str]:
-    """The command line, with its workers in a session of its own."""
-    environment = {**os.environ, "PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
-    line = [sys.executable, "-m", "pipeline", *words]
-    return subprocess.Popen(
-        line,
-        cwd=cwd,
-        env=environment,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-    )
-
-
-def session(leader: int) -> set[int]:
-    """The living processes of a session; what waits for its parent to look is dead."""
-    found = set()
-    for folder in Path("/proc").iterdir():
-        if folder.name.isdigit():
-            try:
-                fields = (folder / "stat").read_text().rpartition(")")[2].split()
-            except OSError:
-                continue
-            if int(fields[3]) == leader and fields[0] not in "ZX":
-                found.add(int(folder.name))
-    return found
-
-
-def strays(folder: Path) -> list[str]:
-    """Half-written files and locks."""
-    return [str(file) for file in folder.rglob(".*") if re.fullmatch(r"\.\d+\..+", file.name) or file.name == LOCK]
+BUSY = 28.0  # [s] more, on a machine that has much else to do
 
 
 @cache
-def whole(words: tuple[str, ...], folder: Path) -> pd.DataFrame:
+def whole(what: str, folder: Path) -> Path:
     with pytest.MonkeyPatch.context() as patch:
         leave_out_pictures(patch)
-        assert call(patch, None, *words, "parallel.workers=1", f"hydra.run.dir={folder}").code == 0
-    return pd.read_parquet(folder / "trajectories.parquet")
+        assert call(patch, None, *WHAT[what], "parallel.workers=1", placed(what, folder)).code == 0
+    return folder
 
 
 @pytest.fixture(scope="module")
@@ -76,48 +37,69 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("whole")
 
 
-@pytest.mark.parametrize("workers", [1, 2])
-@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM])
-@pytest.mark.parametrize("what", ["plan", "front"])
+@pytest.mark.parametrize(
+    ("what", "how", "workers"),
+    [
+        *(("plan", how, workers) for how in (signal.SIGKILL, signal.SIGTERM) for workers in (1, 2)),
+        *(("front", how, workers) for how in (signal.SIGKILL, signal.SIGTERM) for workers in (1, 2)),
+        ("sweep", signal.SIGTERM, 2),  # by SIGKILL: test_resume.py
+    ],
+)
 def test_a_run_that_is_ended_goes_on(
     what: str, how: signal.Signals, workers: int, tmp_path: Path, undisturbed: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    words, folder = {"plan": PLAN, "front": FRONT}[what], tmp_path / "run"
-    store = folder / UNFINISHED
-    running = begin(*words, f"parallel.workers={workers}", f"hydra.run.dir={folder}", cwd=tmp_path)
+    folder = tmp_path / "out"
+    words = (*WHAT[what], f"parallel.workers={workers}", placed(what, folder))
+    at_work = folder / "1_sim1" if what == "sweep" else folder
+    store = at_work / UNFINISHED
+    running = begin(*words, cwd=tmp_path)
     wait_until(lambda: len(kept(store)) >= 3 or running.poll() is not None)
     assert running.poll() is None
-    running.send_signal(how)
-    asked = time.monotonic()
-    _, said = running.communicate()
-    wait_until(lambda: not session(running.pid))
-    assert time.monotonic() - asked < GONE + 28  # on a machine that has much else to do
+    said, took = end(running, how)
+    assert took < GONE + BUSY
     if how is signal.SIGTERM:
-        assert running.returncode == 143
-        assert said == "error: terminated; what is finished is kept, start again to go on\n"
+        assert (running.returncode, said) == (143, SAID)
         assert not strays(folder)
     else:
         assert running.returncode == -signal.SIGKILL
     before = {file: file.stat().st_mtime_ns for file in kept(store)}
-    assert not (folder / "run.json").exists()
+    assert len(before) >= 3
+    assert not (at_work / "run.json").exists()
 
     leave_out_pictures(monkeypatch)
-    assert call(monkeypatch, None, *words, f"parallel.workers={workers}", f"hydra.run.dir={folder}").code == 0
-    assert len(before) >= 3
+    assert call(monkeypatch, None, *words).code == 0
     assert not strays(folder)
     assert not store.exists()
-    again = pd.read_parquet(folder / "trajectories.parquet")
-    pd.testing.assert_frame_equal(again, whole(words, undisturbed / what), check_exact=True)
+    assert_same(folder, whole(what, undisturbed / what))
 
 
-def test_a_sweep_leaves_no_thread(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Rerun's streams, a run's and its blueprint's, have two threads each until they are told to go."""
+def test_workers_that_have_no_work_yet_leave_too(tmp_path: Path) -> None:
+    running = begin(*WHAT["plan"], "parallel.workers=2", placed("plan", tmp_path / "out"), cwd=tmp_path)
+    wait_until(lambda: len(session(running.pid)) >= 3 or running.poll() is not None)
+    assert running.poll() is None
+    assert end(running, signal.SIGKILL)[1] < GONE + BUSY
+
+
+def test_a_sweep_leaves_no_thread_and_no_arm(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Rerun's streams, a run's and its blueprint's, have two threads each until they are told to go; a program that
+    Drake holds can hold an arm with all its plants; Hydra keeps what every job returns.
+    """
     monkeypatch.chdir(tmp_path)
-    words = ("-m", "methods=[lsv]", "path.length=0.05", "export.method=none")
+    small = ("path.length=0.05", "timing.steps=12", "timing.duration=2", "path.tolerance=0.01", "export.method=none")
+    few = ("method.lsv.dt=0.05", "method.pmke.dt=0.05", "method.pmke.horizon=1", *FEW_STARTS)
+    living: list[tuple[int, int, int]] = []
 
-    def after(seeds: str) -> int:
-        assert call(monkeypatch, None, *words, f"seed={seeds}", f"hydra.sweep.dir=of{len(seeds)}").code == 0
-        return len(os.listdir("/proc/self/task"))
+    def watched(values: DictConfig) -> int:
+        code = main.job(values)
+        gc.collect()
+        everything = gc.get_objects()
+        arms = sum(type(one) is Arm for one in everything)
+        living.append((len(os.listdir("/proc/self/task")), arms, len(everything)))
+        return code
 
-    first = after("1,2")
-    assert after("3,4,5,6") <= first
+    words = ("-m", "methods=[lsv,pmke,global]", *small, *few, "seed=1,2,3,4", "hydra.sweep.dir=all")
+    assert call(monkeypatch, None, *words, entry=lambda: main.run_job(watched)).code == 0
+    threads, arms, objects = zip(*living[1:], strict=True)
+    assert max(threads) == threads[0]
+    assert max(arms) == arms[0]
+    assert objects[2] - objects[1] < 500

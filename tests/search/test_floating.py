@@ -54,7 +54,7 @@ def test_metrics_are_the_objectives_own(rng: np.random.Generator) -> None:
 def test_starts_keep_momentum_and_boundary(words: tuple[str, ...]) -> None:
     problem = prepare(composed("+experiment=floating3r", "timing.steps=12", *words))
     arm, times = problem.task.arm, problem.times
-    motions = Roadmap(nodes=40, most=4).starts(problem, times, np.random.default_rng(3))
+    motions = Roadmap(problem, times, np.random.default_rng(3), nodes=40).cheapest(4)
     assert 2 <= len(motions) <= 4
     q, qd = motions[:, :-1].reshape(-1, arm.n), (np.diff(motions, axis=1) / np.diff(times)[:, None]).reshape(-1, arm.n)
     left = arm.base.mean_momentum_residual(arm, q, qd, np.tile(np.diff(times), len(motions)))[0]

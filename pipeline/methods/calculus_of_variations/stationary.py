@@ -1,4 +1,4 @@
-"""Every stationary motion of the kinetic-energy integral, by the calculus of variations (r = 1, no limits).
+"""Stationary motions of the kinetic-energy integral, by the calculus of variations (r = 1, no limits).
 
 Or of any other integral of first order, L = 1/2 qd' G qd - k0 w (`problem/lagrangian.py`), G then standing for M.
 They are extremals (`extremals.py`) that also meet the condition of their ends. At a free end the momentum
@@ -62,9 +62,9 @@ class _Family:
 
 
 def solve(problem: Problem, options: CalculusOfVariationsOptions, context: Context) -> list[Solution]:
-    """All stationary motions on the knots that their path needs, cheapest first. Their statistics: `integral`, the
-    objective in continuous time, `kind` (minimum or saddle), `index`, `unknown` [rad or rad/s] and `residual` t' M qd
-    at T.
+    """The stationary motions that the scan finds, on the knots that their path needs, cheapest first. Their statistics:
+    `integral`, the objective in continuous time, `kind` (minimum or saddle), `index`, `unknown` [rad or rad/s] and
+    `residual` t' M qd at T.
     """
     problem = replace(problem, times=on_path(problem))
     found: list[tuple[_Family, float]] = []

@@ -12,7 +12,7 @@ from pipeline.problem.problem import Problem
 from pipeline.problem.resolution import MOST, divided, resolving, roughly, steps_needed
 from pipeline.problem.solution import Trajectory
 
-INNER = 4  # sub-intervals per knot interval at which a motion is held against its path
+INNER = 8  # sub-intervals per knot interval at which a motion is held against its path
 
 
 def refinement(times: Array, coarse_steps: int) -> list[Array]:

@@ -11,6 +11,7 @@ is built once; `solve` only exchanges the numbers behind it.
 from __future__ import annotations
 
 from typing import Any
+from weakref import proxy
 
 import numpy as np
 from pydrake.solvers import MathematicalProgram
@@ -36,8 +37,10 @@ class Window:
         self._earlier = np.tri(horizon)[:, :, None, None]
         self.program = MathematicalProgram()
         w = self.program.NewContinuousVariables(horizon * self.n, "w")
-        self._rows = DifferentiableConstraint(self._tracking)
-        self.program.AddCost(DifferentiableCost(self._energy), vars=w)
+        here = proxy(self)  # what Drake is given must not keep us alive: Python sees no circle through Drake
+        self._rows = DifferentiableConstraint(lambda w: here._tracking(w))
+        self._cost = DifferentiableCost(lambda w: here._energy(w))
+        self.program.AddCost(self._cost, vars=w)
         self.program.AddConstraint(self._rows, lb=np.zeros(horizon * task.m), ub=np.zeros(horizon * task.m), vars=w)
 
     def solve(
@@ -45,6 +48,7 @@ class Window:
     ) -> tuple[Array, float, ipopt.Outcome, int]:
         """From q_start (n,) through x_ref (h, m), started at guess (h, n): q (h, n), objective, outcome, iterations."""
         self._rows.forget()
+        self._cost.forget()
         velocity = np.diff(np.vstack([q_start, guess]), axis=0) / self.dt
         metric = self.lagrangian.metric(guess)
         energy = 0.5 * self.dt * float(np.einsum("ki,kij,kj->", velocity, metric, velocity))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg.lapack import dpbsv
+from scipy.linalg.lapack import dpbsv, dposv
 
 from pipeline.common.arrays import Array
 from pipeline.program.newton.knots import Blocks
@@ -51,19 +51,36 @@ class Banded:
             out[:, place] = off.reshape(*off.shape[:2], -1)
         return out.reshape(len(diagonal), self.length, self.above + 1)
 
-    def solve(self, matrices: Array, positive: Array, right: Array) -> tuple[Array, int]:
-        """x (S, U, size) with H x = right for each start, and for how many H had to be replaced.
+    def solve(
+        self, matrices: Array, positive: Array, right: Array, rows: Array | None = None, target: Array | None = None
+    ) -> tuple[Array, Array, int]:
+        """x (S, U, size) and nu (S, T) with H x + G'nu = right and G x = target for each start, and for how many H had
+        to be replaced; rows G (S, T, U size) may be none.
 
         Where H is not positive definite it fades into `positive`, a matrix that is, until its Cholesky factors exist.
         """
-        flat, x = np.empty((len(right), self.length)), np.zeros((len(right), self.length))
-        flat[:, self.place] = right.reshape(len(right), -1)
-        changed = 0
+        count = len(right)
+        rows = np.empty((count, 0, self.length)) if rows is None else rows
+        ties = rows.shape[1]
+        flat, x = np.empty((count, self.length, 1 + ties)), np.zeros((count, self.length))
+        flat[:, self.place, 0] = right.reshape(count, -1)
+        flat[:, self.place, 1:] = rows.swapaxes(1, 2)
+        nu, changed = np.zeros((count, ties)), 0
         for s, matrix in enumerate(matrices):
-            _, x[s], info = dpbsv(matrix.T, flat[s])
+            _, solved, info = dpbsv(matrix.T, flat[s])
             changed += bool(info)
             for share in FADING if info else ():
-                _, x[s], info = dpbsv((share * matrix + (1 - share) * positive[s]).T, flat[s])
+                _, solved, info = dpbsv((share * matrix + (1 - share) * positive[s]).T, flat[s])
                 if not info:
                     break
-        return x[:, self.place].reshape(right.shape), changed
+            if ties and target is not None:
+                against = flat[s, :, 1:].T @ solved
+                nu[s] = _least(against[:, 1:], against[:, 0] - target[s])
+            x[s] = solved[:, 0] - solved[:, 1:] @ nu[s]
+        return x[:, self.place].reshape(right.shape), nu, changed
+
+
+def _least(matrix: Array, right: Array) -> Array:
+    """The solution of a symmetric positive system; not a number where it is none."""
+    _, solution, info = dposv(matrix, right)
+    return np.asarray(solution) if not info else np.full(len(right), np.nan)

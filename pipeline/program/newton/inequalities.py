@@ -13,12 +13,18 @@ from pipeline.program.newton.bounds import Bounds
 from pipeline.program.newton.knots import Blocks
 from pipeline.program.newton.stencils import By
 
+PENALTY = 1e3  # of positions and steps
+
 
 class Inequalities:
-    """`bounds`, and `rows` more at each knot, of order one."""
+    """`bounds`, and `rows` more at each knot, of order one.
 
-    def __init__(self, bounds: Bounds, rows: int) -> None:
+    penalty (L,): of an excess [rad or 1] in units of the start's cost; multipliers of what can be kept are smaller.
+    """
+
+    def __init__(self, bounds: Bounds, rows: int, penalty: float) -> None:
         self.bounds, self.knots, self.rows, self.own = bounds, bounds.knots, rows, len(bounds.offset)
+        self.penalty = np.concatenate([np.full(self.own, PENALTY), np.full(rows * self.knots.count, penalty)])
         self.width = np.concatenate([bounds.width, np.ones(rows * self.knots.count)])
 
     def __bool__(self) -> bool:

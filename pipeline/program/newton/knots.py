@@ -73,8 +73,11 @@ class Knots:
 
     def pairs(self, blocks: Array, places: int, apart: int) -> Array:
         """Couplings of knots k and k + apart (S, pairs, ...), in a cycle round its end: of owners `places` after k."""
-        moved = self.after(blocks, places)
-        return moved if self.cyclic else moved[:, : max(self.count - apart, 0)]
+        return self.after(blocks, places)[:, : self.pairs_of(apart)]
+
+    def pairs_of(self, apart: int) -> int:
+        """How many knots have one that is so far on."""
+        return self.count if self.cyclic else max(self.count - apart, 0)
 
     def spread(self, at_end: Array, at_begin: Array) -> Array:
         """The sum (S, U, ...) of parts of owned intervals at their ends and at their beginnings."""

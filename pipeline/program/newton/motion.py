@@ -21,6 +21,7 @@ from pipeline.model.task import Task
 from pipeline.problem.objective import Objective
 from pipeline.program.newton import triangular
 from pipeline.program.newton.knots import Blocks, Knots
+from pipeline.program.newton.momentum import LOOSE, Ties
 from pipeline.program.newton.stencils import By
 
 
@@ -47,7 +48,8 @@ def _each(value: Any, change: Any) -> Any:
 class Point(PerStart):
     """At unknowns x (S, U, n): cost (S,), gradient (S, U, n), blocks of the Hessian and of the stiffness M/dt alone,
     error (S, U, m); J' = Y R with null space Z; columns for the curvature of the path (`rows.py`); kept (S, U, R), what
-    must not be negative (`Rows`), and its derivatives by (`stencils.py`).
+    must not be negative (`Terms`), and its derivatives by (`stencils.py`); tie (S, U, T), what must be zero besides,
+    and its derivatives tied.
     """
 
     cost: Array
@@ -61,36 +63,42 @@ class Point(PerStart):
     columns: tuple[Array, ...]
     kept: Array
     by: By
+    tie: Array
+    tied: By
 
 
-class Rows(Protocol):
-    """Inequalities c(x) >= 0, `count` (R) for each knot, which know of `reach` unknowns before its own."""
+class Terms(Protocol):
+    """What a problem adds to energy and path: a share of the objective, and inequalities c(x) >= 0, `count` (R) for
+    each knot, which know of `reach` unknowns before its own and cost `penalty` times what they lack.
+    """
 
     count: int
     reach: int
+    penalty: float
 
-    def values(self, x: Array, begin: Array) -> Array:
-        """c (S, U, R)."""
+    def values(self, x: Array, begin: Array) -> tuple[Array, Array]:
+        """The share (S,) and c (S, U, R)."""
 
-    def differentiate(self, x: Array, begin: Array) -> tuple[Array, By]:
-        """c and its derivatives."""
+    def differentiate(self, x: Array, begin: Array) -> tuple[Array, Array, Blocks, Array, By]:
+        """The share, its gradient (S, U, n), positive blocks of its Hessian; c and its derivatives."""
 
-    def curvature(self, x: Array, begin: Array, z: Array) -> Blocks:
-        """Blocks of the sum of -z (S, U, R) times the second derivatives of c."""
+    def curvature(self, x: Array, begin: Array, z: Array, scale: Array) -> Blocks:
+        """Blocks of what is missing: scale (S,) times the share's Hessian, less z (S, U, R) times that of c."""
 
 
 class Nothing:
-    """No such rows."""
+    """No such terms."""
 
     count = reach = 0
+    penalty = 0.0
 
-    def values(self, x: Array, begin: Array) -> Array:
-        return np.empty((*x.shape[:2], 0))
+    def values(self, x: Array, begin: Array) -> tuple[Array, Array]:
+        return np.zeros(len(x)), np.empty((*x.shape[:2], 0))
 
-    def differentiate(self, x: Array, begin: Array) -> tuple[Array, By]:
-        return self.values(x, begin), ()
+    def differentiate(self, x: Array, begin: Array) -> tuple[Array, Array, Blocks, Array, By]:
+        return np.zeros(len(x)), np.zeros(()), (), np.empty((*x.shape[:2], 0)), ()
 
-    def curvature(self, x: Array, begin: Array, z: Array) -> Blocks:
+    def curvature(self, x: Array, begin: Array, z: Array, scale: Array) -> Blocks:
         return ()
 
 
@@ -98,12 +106,20 @@ NOTHING = Nothing()
 
 
 class Motions:
-    """Motions of one task on one grid, and what they must keep besides (`kept`)."""
+    """Motions of one task on one grid; `terms`: what counts besides energy and path, `ties`: what is zero besides."""
 
     def __init__(
-        self, chain: Chain, task: Task, objective: Objective, knots: Knots, x_ref: Array, kept: Rows = NOTHING
+        self,
+        chain: Chain,
+        task: Task,
+        objective: Objective,
+        knots: Knots,
+        x_ref: Array,
+        terms: Terms = NOTHING,
+        ties: Ties = LOOSE,
     ) -> None:
-        self.chain, self.knots, self.rows, self.kept = chain, knots, TaskRows(chain, task), kept
+        self.chain, self.knots, self.rows, self.terms = chain, knots, TaskRows(chain, task), terms
+        self.ties, self.counted = ties, np.where(np.arange(chain.n) < task.arm.base.count, 0.0, 1.0)
         self.n, self.m = chain.n, task.m
         self.inertia, self.norm = objective.weight("kinetic_energy"), objective.weight("velocity_norm")
         self.target = x_ref[knots.first : knots.first + knots.count]
@@ -113,16 +129,17 @@ class Motions:
         qd = self.knots.steps(x, begin) / self.knots.dt[:, None]
         return x.reshape(-1, self.n), qd.reshape(-1, self.n), np.tile(self.target, (len(x), 1))
 
-    def value(self, x: Array, begin: Array) -> tuple[Array, Array, Array]:
-        """Cost (S,), path error (S, U, m), what is kept (S, U, R)."""
+    def value(self, x: Array, begin: Array) -> tuple[Array, Array, Array, Array]:
+        """Cost (S,), path error (S, U, m), what is kept (S, U, R) and what is tied (S, U, T)."""
         q, qd, target = self._flat(x, begin)
         at = self.chain.places(q)
-        value = self.norm * (qd * qd).sum(axis=1)
+        value = self.norm * (qd * qd) @ self.counted
         if self.inertia:
             value = value + self.inertia * energy(self.chain, q, qd, second=False, at=at).value
         error = self.rows.error(at, target)
         cost = value.reshape(len(x), -1) @ self.knots.weight
-        return cost, error.reshape(len(x), -1, self.m), self.kept.values(x, begin)
+        share, kept = self.terms.values(x, begin)
+        return cost + share, error.reshape(len(x), -1, self.m), kept, self.ties.values(x, begin)
 
     def differentiate(self, x: Array, begin: Array) -> Point:
         """Everything at x (S, U, n)."""
@@ -138,13 +155,14 @@ class Motions:
         found = self.rows.evaluate(at, target)
         R, Q_of_rows = triangular.split(np.ascontiguousarray(found.jacobian.transpose(2, 1, 0)))
         basis = np.ascontiguousarray(Q_of_rows.transpose(2, 0, 1)).reshape(S, U, n, n)
-        kept, by = self.kept.differentiate(x, begin)
+        share, slope, more, kept, by = self.terms.differentiate(x, begin)
+        tie, tied = self.ties.differentiate(x, begin)
         curved = knots.spread(weight[:, :, None] * Q + P + P.swapaxes(-1, -2) + stiff, stiff)
         return Point(
-            cost=value.reshape(S, U) @ knots.weight,
-            gradient=knots.spread(weight * by_q + owns[:, None] * by_qd, -owns[:, None] * by_qd),
-            hessian=(curved, knots.between(-P - stiff)),
-            stiff=(knots.spread(stiff, stiff), knots.between(-stiff)),
+            cost=value.reshape(S, U) @ knots.weight + share,
+            gradient=knots.spread(weight * by_q + owns[:, None] * by_qd, -owns[:, None] * by_qd) + slope,
+            hessian=self._joined((curved, knots.between(-P - stiff)), more),
+            stiff=self._joined((knots.spread(stiff, stiff), knots.between(-stiff)), more),
             error=found.error.reshape(S, U, self.m),
             Y=basis[..., : self.m],
             Z=basis[..., self.m :],
@@ -152,26 +170,35 @@ class Motions:
             columns=tuple(a.reshape(S, U, n, 3) for a in found.columns),
             kept=kept,
             by=by,
+            tie=tie,
+            tied=tied,
         )
 
     def _lagrangian(self, q: Array, qd: Array, at: Places) -> tuple[Array, ...]:
         """L (K,), dL/dq, dL/dqd (K, n), M, P, Q (K, n, n)."""
+        if not self.inertia:
+            zero, none = np.zeros_like(q), np.zeros((*q.shape, self.n))
+            norm = none + 2 * self.norm * np.diag(self.counted)
+            return self.norm * (qd * qd) @ self.counted, zero, 2 * self.norm * qd * self.counted, norm, none, none
         found = energy(self.chain, q, qd, at=at)
         parts = (found.value, found.by_q, found.by_qd, found.mass, found.mixed, found.by_q_q)
         if self.inertia == 1.0 and not self.norm:
             return parts
         value, by_q, by_qd, M, P, Q = (self.inertia * part for part in parts)
-        value, by_qd = value + self.norm * (qd * qd).sum(axis=1), by_qd + 2 * self.norm * qd
-        return value, by_q, by_qd, M + 2 * self.norm * np.eye(self.n), P, Q
+        value, by_qd = value + self.norm * (qd * qd) @ self.counted, by_qd + 2 * self.norm * qd * self.counted
+        return value, by_q, by_qd, M + 2 * self.norm * np.diag(self.counted), P, Q
 
     @property
     def reach(self) -> int:
         """How far apart unknowns are that know of each other."""
-        return max(1, self.kept.reach)
+        return max(1, self.terms.reach)
 
-    def bent(self, x: Array, begin: Array, z: Array) -> Blocks:
-        """What the rows' curvature adds to the Hessian, by their multipliers z (S, U, R)."""
-        return self.kept.curvature(x, begin, z)
+    def _joined(self, blocks: Blocks, more: Blocks) -> Blocks:
+        """The sum of both, as far from the diagonal as any goes."""
+        size = blocks[0].shape
+        empty = [np.zeros((size[0], self.knots.pairs_of(j), *size[2:])) for j in range(len(blocks), self.reach + 1)]
+        joined = (*blocks, *empty)
+        return tuple(a + b for a, b in zip(joined, more, strict=True)) if more else joined
 
     def curvature(self, point: Point, multipliers: Array) -> Array:
         """multipliers (S, U, m) . d2x/dq2: (S, U, n, n)."""

@@ -24,6 +24,16 @@ def pull(knots: Knots, by: By, z: Array) -> Array:
     return np.asarray(sum(knots.after((z[:, :, None] @ g)[:, :, 0], s) for s, g in enumerate(by)))
 
 
+def dense(knots: Knots, by: By) -> Array:
+    """The rows (S, U R, U n), all of them."""
+    starts, count, rows, n = by[0].shape
+    out, knot = np.zeros((starts, count, rows, count, n)), np.arange(count)
+    for s, g in enumerate(by):
+        own = knot if knots.cyclic else knot[s:]
+        out[:, own, :, own - s] = g[:, own].swapaxes(0, 1)
+    return out.reshape(starts, count * rows, count * n)
+
+
 def weigh(knots: Knots, by: By, sigma: Array) -> tuple[Array, ...]:
     """The sum of sigma (S, U, R) times the outer squares of the rows' gradients, as blocks (`gather`)."""
     weighted = [g.swapaxes(-1, -2) * sigma[:, :, None] for g in by]

@@ -17,7 +17,6 @@ from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Status
 from tests.support import FEW, composed
 
-LEAST = replace(FEW, optimised=2)
 WINDOW = RecedingOptions(prediction_step=0.2, horizon=5, update_interval=0.6)
 
 
@@ -62,7 +61,7 @@ def test_torque_as_the_objective_of_the_predictions_costs_less_torque() -> None:
     assert interpolated.status is Status.SOLVED
     by_energy = evaluate(asked, receding(asked, WINDOW)[0])
     by_torque = evaluate(asked, receding(asked, replace(WINDOW, objective="torque"))[0])
-    best = evaluate(asked, global_planner(replace(asked, objective=Objective({"torque": 1.0})), LEAST)[0])
+    best = evaluate(asked, global_planner(replace(asked, objective=Objective({"torque": 1.0})), FEW)[0])
     assert by_torque.status is by_energy.status is Status.SOLVED
     assert best.torque_integral[-1] * 0.9 < by_torque.torque_integral[-1] < 0.8 * by_energy.torque_integral[-1]
     assert by_torque.energy_integral[-1] > by_energy.energy_integral[-1]

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import gc
+import weakref
 from collections.abc import Callable
 
 import numpy as np
@@ -85,3 +87,16 @@ def test_a_path_that_has_not_begun_leaves_the_arm_at_rest(task: PositionTask, q_
     assert outcome.converged
     np.testing.assert_allclose(q, np.tile(q_init, (3, 1)), atol=1e-9)
     assert energy < 1e-15
+
+
+def test_a_window_is_gone_when_nobody_has_it(
+    task: PositionTask, reference: Callable[[int], Reference], q_init: Array
+) -> None:
+    """What it has given to Drake must not hold it, and with it the arm and its plants, for the whole process."""
+    window = Window(Lagrangian(task, Objective()), 2, 1.0)
+    x_ref = reference(3).position(np.array([1.0, 2.0]))
+    window.solve(q_init, x_ref, rollout(task, q_init, x_ref))
+    gone = weakref.ref(window)
+    del window
+    gc.collect()
+    assert gone() is None
