@@ -277,7 +277,7 @@ def _to_the_end(
     batch: Batch | None,
     context: Context,
 ) -> tuple[Problem, list[Array], list[Optimum]]:
-    """Every optimum on the last grid, and on finer ones while a motion leaves its path between knots; the problem is
+    """Every optimum on the last grid, and on finer ones while the best leaves its path between knots; the problem is
     then the one on these.
     """
     refined = _refine_all(problem, grids, options, optima, batch, context)
