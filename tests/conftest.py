@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -22,8 +21,8 @@ from pipeline.path.reference import Reference
 from pipeline.path.timing import RaisedCosine
 from pipeline.problem.problem import Problem
 from pipeline.robot import urdf
+from tests.once import made_once
 from tests.support import ROOT
-from tests.tasks import wait_until
 
 settings.register_profile("project", derandomize=True, deadline=None, max_examples=50)
 settings.load_profile("project")
@@ -132,26 +131,8 @@ def peer(planar_file: Path) -> SimpleNamespace:
 
 @pytest.fixture(scope="session")
 def reproduced(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Every run that a printed number is found in, with fewer starts and without pictures: the folder above `runs`.
-
-    Test processes that run side by side share it: the first makes it, the others wait.
-    """
-    own = tmp_path_factory.getbasetemp()
-    folder = (own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / "reproduced"
-    made, failed = folder / "made", folder / "failed"
-    try:
-        folder.mkdir()
-    except FileExistsError:
-        wait_until(lambda: made.exists() or failed.exists())
-    else:
-        try:
-            reproduce_in(folder)
-            made.touch()
-        finally:
-            if not made.exists():
-                failed.touch()
-    assert made.exists(), "the reproduction failed in another process"
-    return folder
+    """Every run that a printed number is found in, with fewer starts and without pictures: the folder above `runs`."""
+    return made_once(tmp_path_factory, "reproduced", reproduce_in)
 
 
 def reproduce_in(folder: Path) -> None:
@@ -163,11 +144,14 @@ def reproduce_in(folder: Path) -> None:
     from tests.reports import leave_out_pictures
 
     few = (
-        *(f"method.global.{key}" for key in ("configurations=12", "candidates=150", "optimised=12")),
+        *(f"method.global.{key}" for key in ("configurations=12", "candidates=150", "optimised=12", "solver=newton")),
         "identification.documents=[global]",
     )
     # Its law is one of large numbers.
-    many = ("method.global.candidates=300", "method.global.optimised=16", "candidate_study.repeats=4")
+    many = (
+        *(f"method.global.{key}" for key in ("candidates=300", "optimised=16", "solver=newton")),
+        "candidate_study.repeats=2",
+    )
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("HYDRA_FULL_ERROR", "0")  # the command line sets it; this puts it back
         patch.setattr(session, "exit_code", 0)

@@ -23,6 +23,7 @@ UNITS = {
     "max_orientation_error": "rad",
     "max_orientation_error_between": "rad",
     "peak_velocity": "rad/s",
+    "peak_acceleration": "rad/s²",
     "peak_torque": "N m",
     "peak_power": "W",
     "min_spectral_radius": "kg m²",
@@ -61,7 +62,8 @@ def markdown(report: Report, table: pd.DataFrame, published: Printed) -> str:
         *markdown_table(_by_quantity(motions.evaluations, table, units)),
         "",
     ]
-    lines += [f"- **{e.label}**: {e.message or e.status.value}" for e in motions.evaluations]
+    for e in motions.evaluations:
+        lines.append("; ".join(filter(None, [f"- **{e.label}**: {e.message or e.status.value}", e.solution.evidence])))
     lines += [f"- robot file: {note}" for note in arm.notes]
     lines += [f"- path: {note}" for note in reference.notes]
     for result in report.results:
@@ -81,7 +83,7 @@ def markdown(report: Report, table: pd.DataFrame, published: Printed) -> str:
 
 def _by_quantity(evaluations: Sequence[Evaluation], table: pd.DataFrame, units: Mapping[str, str]) -> list[list[str]]:
     rows = [["", *(e.label for e in evaluations)]]
-    skipped = ("method", "optimum", "message")
+    skipped = ("method", "optimum", "message", "evidence")
     for column in table.columns:
         if (
             column in skipped

@@ -38,7 +38,13 @@ def joint_trajectory(motion: Resampled, joints: Sequence[str], frame: str) -> di
             }
         )
     header = {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": frame}
-    return {"header": header, "joint_names": list(joints), "points": points}
+    message = {"header": header, "joint_names": list(joints), "points": points}
+    return {"warning": warning(motion), **message} if motion.faults else message
+
+
+def warning(motion: Resampled) -> str:
+    """What the files of a motion say that cannot be sent, and was written all the same."""
+    return f"NOT TO BE SENT: this motion {motion.fault}"
 
 
 def write(report: Report, folder: Path) -> None:
@@ -52,7 +58,8 @@ def save(folder: Path, motion: Resampled, joints: Sequence[str], frame: str) -> 
     """The three files of one motion, of an arm with these joints on the link `frame`."""
     message = joint_trajectory(motion, joints, frame)
     rows = table(motion, joints)
-    write_beside(folder / "motion.csv", lambda file: rows.to_csv(file, index=False))
+    head = f"# {warning(motion)}\n" if motion.faults else ""
+    write_beside(folder / "motion.csv", lambda file: file.write_text(head + rows.to_csv(index=False), encoding="utf-8"))
     write_beside(folder / "motion.json", lambda file: file.write_text(json.dumps(message, indent=1), encoding="utf-8"))
     text = yaml.dump(message, sort_keys=False, default_flow_style=None, width=10_000, Dumper=_DUMPER)
     write_beside(folder / "motion.yaml", lambda file: file.write_text(text, encoding="utf-8"))

@@ -141,6 +141,7 @@ def _row(problem: Problem, e: Evaluation) -> dict[str, Any]:
         "optimum": e.solution.optimum,
         "status": e.status.word,
         "message": e.message,
+        "evidence": e.solution.evidence,
         "kinetic_energy_integral": e.energy_integral[-1],
         "torque_integral": e.torque_integral[-1],
         "kinetic_energy_integral_spline": e.energy_integral_spline,
@@ -150,7 +151,10 @@ def _row(problem: Problem, e: Evaluation) -> dict[str, Any]:
         "final_error": e.tracking_error[-1],
         **_orientation(problem, e),
     }
-    for name, values in (("velocity", e.qd), ("torque", e.tau), ("power", e.power)):
+    peaks = {"velocity": e.qd, "torque": e.tau, "power": e.power}
+    if problem.bounds.smooth or any(problem.rest):
+        peaks["acceleration"] = e.qdd
+    for name, values in peaks.items():
         row |= {f"peak_{name}_{j + 1}": peak for j, peak in enumerate(np.abs(values).max(axis=0))}
     row |= _base(problem, e)
     if problem.obstacles is not None:

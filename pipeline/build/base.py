@@ -79,6 +79,8 @@ def _moved(problem: Problem, base: Base) -> Problem:
         padded(own.torque),
         padded(own.power),
         own.attitude,
+        padded(np.broadcast_to(own.acceleration, fixed.n)),
+        padded(np.broadcast_to(own.jerk, fixed.n)),
     )
     q_init = np.concatenate([np.zeros(base.count), problem.q_init])
     return replace(problem, task=replace(problem.task, arm=arm), q_init=q_init, limits=limits)
@@ -88,6 +90,9 @@ def _spacecraft(base: FreeBaseConfig, arm: Arm) -> Spacecraft:
     check_root(arm.description)
     momentum = (*base.linear_momentum, *base.angular_momentum)
     if base.mass is None:
+        for key, value in (("inertia", base.inertia), ("com", base.com)):
+            if np.any(value):
+                raise ConfigError(f"base.{key} = {shown(value)}: that of a spacecraft; give its base.mass too")
         if root_mass(arm.description) <= 0:
             raise ConfigError(
                 f"base.mass: not given, and the root link {arm.description.base} of {arm.description.name} has no mass"

@@ -17,18 +17,21 @@ from pipeline.model.obstacles import Obstacles
 from pipeline.problem.limits import Limits
 from pipeline.problem.objective import Objective
 from pipeline.problem.secondary import Secondary
+from pipeline.robot.joint_limits import read
 from pipeline.robot.limits import UNLIMITED
+from pipeline.robot.packages import find
 
 
 def make_limits(limits: LimitsConfig, arm: Arm) -> Limits:
-    """The description's limits as far as `kind` takes them, overridden by the values given."""
+    """The description's limits as far as `kind` takes them, overridden by the file, and that by the values given."""
+    stated = {} if limits.file is None else read(find(limits.file, "limits.file"), arm.description.joints)
     description, free = arm.description, np.full(arm.n, np.inf)
     joint, all_of_them = limits.kind != "none", limits.kind == "joint_torque_power"
 
     def bound(key: str, own: Array) -> Array:
         given = getattr(limits, key)
         if given is None:
-            return own
+            return np.where(np.isnan(stated[key]), own, stated[key]) if key in stated else own
         if isinstance(given, tuple) and len(given) != arm.n:
             raise ConfigError(f"limits.{key} has {len(given)} values, the arm has {arm.n} moving joints")
         values = np.broadcast_to(np.asarray(given, dtype=float), arm.n)
@@ -40,6 +43,8 @@ def make_limits(limits: LimitsConfig, arm: Arm) -> Limits:
         velocity=bound("velocity", description.velocity if joint else free),
         torque=bound("torque", description.effort if all_of_them else free),
         power=bound("power", free),
+        acceleration=bound("acceleration", free),
+        jerk=bound("jerk", free),
         attitude=np.inf if limits.attitude is None else limits.attitude,
     )
 

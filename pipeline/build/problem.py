@@ -6,8 +6,10 @@ from pipeline.build import base
 from pipeline.build.checks import check_problem, require_reach
 from pipeline.build.goal import make_limits, make_objective, make_obstacles
 from pipeline.build.path import make_knots, make_reference, make_task
+from pipeline.build.rest import check_rest
 from pipeline.build.robot import initial, load
 from pipeline.config.run import RunConfig
+from pipeline.config.steps import refuse_endless
 from pipeline.problem.problem import Boundary, Problem
 from pipeline.robot.limits import require_held_within
 
@@ -21,6 +23,8 @@ def prepare(config: RunConfig) -> Problem:
     task = make_task(robot, arm)
     q_init = initial(robot, arm)
     reference, q_init = make_reference(config.path, config.timing, task, q_init)
+    if config.timing.law == "from_file":
+        refuse_endless(config, reference.duration, "path.file, which takes ")
     problem = Problem(
         task,
         reference,
@@ -30,8 +34,11 @@ def prepare(config: RunConfig) -> Problem:
         limits=make_limits(config.limits, arm),
         boundary=Boundary(config.boundary.kind),
         obstacles=make_obstacles(config.obstacles, arm),
+        rest=("start" in config.boundary.rest, "end" in config.boundary.rest),
+        zero_acceleration=config.boundary.zero_acceleration,
     )
     check_problem(problem)
     if config.base.kind == "fixed":
         require_reach(problem)
+    check_rest(problem)
     return base.place(problem, config)

@@ -37,6 +37,7 @@ def require_regular(arm: Arm) -> None:
     several = len(names) > 1
     raise RobotError(
         f"robot.urdf = {description.file}: link{'s' * several} {', '.join(links)}: moving joint{'s' * several} "
-        f"{', '.join(names)} moves no mass, since all of it lies on the ax{'e' if several else 'i'}s and has no "
-        "inertia, so that the mass matrix is singular; give the link an inertia, or robot.armature"
+        f"{', '.join(names)} moves no mass, or next to none beside that of others: all of it lies on the "
+        f"ax{'e' if several else 'i'}s and has no inertia, so that the mass matrix is singular; give the link an "
+        "inertia, or robot.armature"
     )

@@ -188,7 +188,7 @@ def _cells(document: Document, experiment: str) -> dict[str, dict[str, float]]:
     values: dict[str, dict[str, float]] = {}
     for _, row in document.rows:
         cell = row.found.cell
-        if not cell or cell.optimum != 1 or cell.column == "wall_time_s":
+        if not cell or cell.optimum != 1 or row.found.timing:
             continue
         if row.between is None and row.found.experiments == (experiment,):
             values.setdefault(cell.method, {}).setdefault(cell.column, row.value)

@@ -12,6 +12,7 @@ A description begins with the unit in brackets, if there is one: messages, `--he
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import field
 from functools import wraps
 from typing import Annotated, Any, TypeVar, cast, dataclass_transform
@@ -36,6 +37,7 @@ from pipeline.config.messages import in_one_line
 
 T = TypeVar("T")
 
+LARGEST = 1e20  # of any number: squares of larger ones leave what a computer counts
 CHECKED = ConfigDict(extra="forbid", validate_by_name=True)
 
 
@@ -54,7 +56,8 @@ def as_name(text: str) -> str:
     return text
 
 
-def _once(words: tuple[T, ...]) -> tuple[T, ...]:
+def once(words: tuple[T, ...]) -> tuple[T, ...]:
+    """Words of which each stands once; raises ValueError."""
     if len(set(words)) != len(words):
         raise ValueError("a word stands twice")
     return words
@@ -79,10 +82,23 @@ Vector = Annotated[Numbers, Field(min_length=3, max_length=3)]
 Coordinate = Annotated[Number, Field(ge=-1e6, le=1e6)]  # [m or rad]: beyond, doubles no longer tell 1e-10 of it apart
 Coordinates = tuple[Coordinate, ...]
 Pose = Annotated[Coordinates, Field(min_length=3, max_length=3)]  # its position or its roll, pitch, yaw
-Words = Annotated[tuple[T, ...], Field(min_length=1), AfterValidator(_once)]
+Words = Annotated[tuple[T, ...], Field(min_length=1), AfterValidator(once)]
 # One for all (joints, axes), or a list.
 OneOrList = Annotated[Annotated[T, Tag("number")] | Annotated[tuple[T, ...], Tag("array")], Discriminator(_kind)]
+WordOrWords = Annotated[Annotated[T, Tag("string")] | Annotated[Words[T], Tag("array")], Discriminator(_kind)]
 WordOrVector = Annotated[Annotated[T, Tag("string")] | Annotated[Vector, Tag("array")], Discriminator(_kind)]
+
+
+def _refuse_large(value: Any, where: str) -> None:
+    """Raise ConfigError for the first number in `value`, tables and lists, that is too large to count with."""
+    if isinstance(value, Mapping):
+        for key, inner in value.items():
+            _refuse_large(inner, f"{where}.{key}" if where else str(key))
+    elif isinstance(value, list | tuple):
+        for index, inner in enumerate(value):
+            _refuse_large(inner, f"{where}[{index}]")
+    elif isinstance(value, float) and LARGEST < abs(value) < float("inf"):
+        raise ConfigError(f"{where} = {value:g}: must be at most {LARGEST:g} in size")
 
 
 @dataclass_transform(frozen_default=True, field_specifiers=(Field, field))
@@ -93,6 +109,7 @@ def schema(cls: type[T]) -> type[T]:
 
     @wraps(plain)
     def init(self: Any, *values: Any, **named: Any) -> None:
+        _refuse_large(named, made.__name__)
         try:
             plain(self, *values, **named)
         except ValidationError as error:
@@ -104,6 +121,7 @@ def schema(cls: type[T]) -> type[T]:
 
 def build(cls: type[T], values: Any, where: str = "") -> T:
     """An instance of `cls` from a mapping; raises ConfigError that names the key and what is allowed."""
+    _refuse_large(values, where)
     try:
         return TypeAdapter(cls).validate_python(values, by_alias=True, by_name=False)
     except ValidationError as error:

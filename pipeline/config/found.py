@@ -38,6 +38,11 @@ class Found:
         """The cell of summary.csv that is the number, if one is."""
         return None
 
+    @property
+    def timing(self) -> bool:
+        """Whether it is a computing time: of this machine, as the printed one is of another."""
+        return False
+
 
 @schema
 class Summary(Found):
@@ -51,6 +56,10 @@ class Summary(Found):
     @property
     def cell(self) -> Cell | None:
         return Cell(self.method, self.optimum, self.column)
+
+    @property
+    def timing(self) -> bool:
+        return self.column == "wall_time_s"
 
 
 @schema
@@ -131,6 +140,10 @@ class PredictionTime(Found):
     of: Annotated[Literal["whole", "optimisation", "rest"], Field(description="of what")] = "whole"
     kind: Literal["prediction_time"] = "prediction_time"
 
+    @property
+    def timing(self) -> bool:
+        return True
+
 
 @schema
 class SpectralRatio(Found):
@@ -182,6 +195,7 @@ class Ratio:
     unit: Annotated[Literal["1", "percent", "percent_of_size"], Field(description="how it is told")] = "1"
     kind: Literal["ratio"] = "ratio"
     cell: ClassVar[None] = None
+    timing: ClassVar[bool] = False
 
     @property
     def experiments(self) -> tuple[str, ...]:

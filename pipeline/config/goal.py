@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Annotated, ClassVar, Literal, get_args
 
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
-from pipeline.config.fields import Number, OneOrList, schema
+from pipeline.config.fields import Number, OneOrList, Switch, Text, once, schema
 
 # The words of problem/integrals.py, whose floor is above: what an integral is, no configuration needs to know.
 Integral = Literal["kinetic_energy", "torque", "velocity_norm", "base_rotation", "reaction_force", "reaction_torque"]
@@ -115,6 +115,16 @@ class LimitsConfig:
     power: Annotated[
         OneOrList[Positive] | None, Field(description="[W] largest |torque x velocity|; no robot description has it")
     ] = None
+    acceleration: Annotated[
+        OneOrList[Positive] | None, Field(description="[rad/s^2] largest joint acceleration, between the knots too")
+    ] = None
+    jerk: Annotated[
+        OneOrList[Positive] | None, Field(description="[rad/s^3] largest joint jerk; needs boundary.zero_acceleration")
+    ] = None
+    file: Annotated[
+        Text | None,
+        Field(description="YAML file of ROS 2, joint_limits.yaml: what it states holds, a value given here overrides"),
+    ] = None
     attitude: Annotated[
         Annotated[Number, Field(gt=0, le=1.5)] | None,
         Field(description="[rad] by how much a floating base may turn from its start, at any time"),
@@ -129,3 +139,11 @@ class BoundaryConfig:
         Literal["fixed", "free", "cyclic"],
         Field(description="fixed: starts at robot.q_init; free: anywhere on its manifold; cyclic: ends as it began"),
     ] = "fixed"
+    rest: Annotated[
+        tuple[Literal["start", "end"], ...],
+        AfterValidator(once),
+        Field(description="at which ends all joints rest, so that the motion can be sent to a robot"),
+    ] = ()
+    zero_acceleration: Annotated[
+        Switch, Field(description="whether they do not accelerate there either, as limits of jerk need")
+    ] = False

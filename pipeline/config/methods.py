@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal, get_args
 
 from pydantic import Field
 
-from pipeline.config.fields import Number, Whole, Words, schema
+from pipeline.config.fields import Number, Whole, WordOrWords, Words, schema
 from pipeline.config.goal import Integral, Positive
 
 MethodName = Literal[
@@ -17,6 +17,7 @@ MethodName = Literal[
     "global",
     "pareto",
     "dynamic_programming",
+    "lower_bound",
     "calculus_of_variations",
     "pontryagin",
     "pontryagin_as_printed",
@@ -99,16 +100,23 @@ class GlobalOptions:
     """The interpolation-based Global Kinematic Planner; counts as in its paper."""
 
     starts: Annotated[
-        Literal["roadmap", "population", "dynamic_programming", "both"],
+        WordOrWords[Literal["roadmap", "population", "dynamic_programming"]],
         Field(
-            description="where the solver starts from; population: as in the paper; dynamic_programming: r = 1; "
-            "both: these"
+            description="where the solver starts from, one or a list; population: as in the paper; "
+            "dynamic_programming: r = 1"
         ),
     ] = "roadmap"
     solver: Annotated[
         Literal["newton", "ipopt"],
         Field(description="newton, confirmed by ipopt, where it serves the problem (the log says so); ipopt: alone"),
     ] = "newton"
+    transcription: Annotated[
+        Literal["differences", "spline"] | None,
+        Field(
+            description="differences: backward, as in the papers; spline: a smooth curve that keeps its limits between "
+            "the knots too; null: spline where boundary.rest, limits.acceleration or limits.jerk ask for it"
+        ),
+    ] = None
     nodes: Annotated[Whole, Field(ge=8, le=10_000, description="of the roadmap, in each layer")] = 300
     layers: Annotated[Whole, Field(ge=2, le=1000, description="of the roadmap, after the first")] = 6
     configurations: Annotated[
@@ -128,13 +136,27 @@ class GlobalOptions:
     optimised: Annotated[
         Whole, Field(ge=1, le=MOST_STARTS, description="motions that are optimised on the coarsest grid")
     ] = 64
+    budget: Annotated[
+        Whole,
+        Field(ge=1, le=MOST_STARTS, description="starts at most, while the last half of them brought something new"),
+    ] = 1024
     limit_weight: Annotated[
         Number, Field(ge=0, description="k_L of eq. (14): distance from the joint limits in the ranking")
     ] = 0.01
     coarse_steps: Annotated[
         Annotated[Whole, Field(ge=2, le=MOST_KNOTS)] | None,
-        Field(description="intervals of the coarsest grid, at most; null: 25, and 12 where ipopt works alone"),
+        Field(
+            description="intervals of the coarsest grid, at most; null: 25, and 12 where ipopt works alone, or as many "
+            "as show the path's shape"
+        ),
     ] = None
+    refine_to: Annotated[
+        Annotated[Whole, Field(ge=2, le=MOST_KNOTS)] | None,
+        Field(
+            description="intervals up to which a grid is refined on which a motion would leave path.tolerance between "
+            "its knots; null: those of timing.steps are kept"
+        ),
+    ] = 2000
     tolerance: Tolerance = 1e-8
     max_iterations: Iterations = 300
     max_time: MaxTime = None
@@ -142,10 +164,15 @@ class GlobalOptions:
         Apart, Field(description="[rad] motions that differ by less at every knot, but for full turns, are one optimum")
     ] = 0.05
 
+    @property
+    def generators(self) -> tuple[str, ...]:
+        """The words of `starts`."""
+        return (self.starts,) if isinstance(self.starts, str) else self.starts
+
 
 @schema
 class DynamicProgrammingOptions:
-    """Dynamic programming on a grid of the self-motion manifold (r = 1): a certificate for the global optimum."""
+    """Dynamic programming on a grid of the self-motion manifold (r = 1): an estimate of the best, and starts."""
 
     nodes: Annotated[Whole, Field(ge=8, le=10_000, description="on the longest manifold along the path")] = 360
     intervals: Annotated[
@@ -158,6 +185,18 @@ class DynamicProgrammingOptions:
     same_path: Annotated[
         Apart, Field(description="[rad] paths closer than this, but for full turns, are one optimum")
     ] = 0.2
+
+
+@schema
+class LowerBoundOptions:
+    """A bound from below on the cost of every motion on a grid's knots, by cells of the self-motion loops (r = 1)."""
+
+    intervals: Annotated[
+        Annotated[Whole, Field(ge=5, le=MOST_KNOTS)] | None,
+        Field(description="of the time grid; null: those of timing.steps"),
+    ] = 50
+    gap: Annotated[Number, Field(ge=1e-6, lt=1, description="relative, to the best motion found: where to stop")] = 1e-3
+    cells: Annotated[Whole, Field(ge=8, le=10_000, description="on the longest manifold, before any is halved")] = 120
 
 
 @schema
@@ -230,6 +269,7 @@ class MethodConfig:
     global_: Annotated[GlobalOptions, Field(alias="global")] = GlobalOptions()
     pareto: ParetoOptions = ParetoOptions()
     dynamic_programming: DynamicProgrammingOptions = DynamicProgrammingOptions()
+    lower_bound: LowerBoundOptions = LowerBoundOptions()
     calculus_of_variations: CalculusOfVariationsOptions = CalculusOfVariationsOptions()
     pontryagin: PontryaginOptions = PontryaginOptions()
     pontryagin_as_printed: PontryaginAsPrintedOptions = PontryaginAsPrintedOptions()

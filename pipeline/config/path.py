@@ -94,7 +94,7 @@ class TimingConfig:
         Field(description="how the path is run through in time; from_file: by the column time of path.file"),
     ] = "raised_cosine"
     duration: Annotated[Number, Field(gt=0, description="[s] motion time, unless it is from_file")] = 10.0
-    steps: Annotated[Whole, Field(ge=2, le=100_000, description="intervals of the grid of the global optimum")] = 100
+    steps: Annotated[Whole, Field(ge=2, le=100_000, description="intervals of the grid of the planner's optima")] = 100
     dense: Annotated[
         tuple[Annotated[Numbers, AfterValidator(_finer)], ...],
         Field(description="rows [from s, to s, factor]: where that grid is finer than elsewhere"),

@@ -7,8 +7,10 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from pipeline.config.fields import Coordinates, Name, Number, OneOrList, Pose, Switch, Text, Vector, Words, schema
+from pipeline.config.fields import Name, Number, OneOrList, Pose, Switch, Text, Vector, Words, schema
 
+Position = Annotated[Number, Field(ge=-1e4, le=1e4)]  # [rad or m] of a joint: a sine is exact there
+Positions = tuple[Position, ...]
 Positive = Annotated[Number, Field(gt=0)]
 Edges = Annotated[tuple[Positive, ...], Field(min_length=3, max_length=3)]
 ORIGIN = (0.0, 0.0, 0.0)
@@ -77,13 +79,13 @@ class RobotConfig:
         dict[str, tuple[Shape, ...]] | None,
         Field(description="{link: [{kind: sphere, box or capsule, ...}, ...]}; null: the primitive shapes of the file"),
     ] = None
-    q_init: Annotated[Coordinates | None, Field(description="[rad] initial configuration, base to tip")] = (
+    q_init: Annotated[Positions | None, Field(description="[rad] initial configuration, base to tip")] = (
         0.0,
         0.327,
         -0.754,
     )
     locked: Annotated[
-        dict[str, Number] | None, Field(description="{joint: position [rad or m], ...} of joints that are held")
+        dict[str, Position] | None, Field(description="{joint: position [rad or m], ...} of joints that are held")
     ] = None
     repair_inertia: Annotated[
         Switch, Field(description="whether inertias that no body can have give way to the nearest possible ones")

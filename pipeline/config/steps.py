@@ -9,23 +9,26 @@ from pipeline.common.errors import ConfigError
 
 MOST_STEPS = 100_000  # every one is evaluated, drawn and recorded
 MOST_SAMPLES = 1_000_000  # every one is simulated, no more
+SHORTEST, LONGEST = 1e-6, 1e9  # [s] of a motion
 STEPS = ("dt", "prediction_step", "update_interval")
 
 
-def refuse_endless(config: Any) -> None:
-    """Raise ConfigError for the first of them that is too many in `config`, the RunConfig that is being made."""
-    duration = config.timing.duration
-    for key, value, count, most in _counts(config):
+def refuse_endless(config: Any, duration: float, of: str = "timing.duration = ") -> None:
+    """Raise ConfigError for the first of them that is too many in a motion of `duration` [s] under `config`, the
+    RunConfig, or for a duration that is none; `of` says whose it is.
+    """
+    if not SHORTEST <= duration <= LONGEST:
+        raise ConfigError(f"{of}{duration:g} s: a motion takes {SHORTEST:g} to {LONGEST:g} s")
+    for key, value, count, most in _counts(config, duration):
         if count > most:
             raise ConfigError(
-                f"{key} = {value:g}: {count:.3g} steps in timing.duration = {duration:g} s; at most {most}, each of "
-                "which is evaluated and written"
+                f"{key} = {value:g}: {count:.3g} steps in {of}{duration:g} s; at most {most}, each of which is "
+                "evaluated and written"
             )
 
 
-def _counts(config: Any) -> Iterator[tuple[str, float, float, int]]:
+def _counts(config: Any, duration: float) -> Iterator[tuple[str, float, float, int]]:
     """Key, value, number of steps and its bound."""
-    duration = config.timing.duration
     for method in config.methods:
         options = config.method.of(method)
         for name in STEPS:

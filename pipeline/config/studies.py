@@ -27,9 +27,12 @@ class ExportConfig:
 
     method: Annotated[
         Literal["best", "none", MethodName],
-        Field(description="best: the cheapest confirmed motion; none; or the first of one method"),
+        Field(description="best: the cheapest confirmed motion that can be sent; none; or that of one method"),
     ] = "best"
     rate: Annotated[Number, Field(gt=0, le=10_000, description="[Hz] of the points")] = 100.0
+    force: Annotated[
+        Switch, Field(description="whether a motion that cannot be sent is written all the same; its files say so")
+    ] = False
 
 
 @schema

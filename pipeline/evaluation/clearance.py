@@ -56,6 +56,8 @@ class Clearance:
 
     def __call__(self, q: Array) -> Array:
         """The distances (K,) at q (K, n): infinite if there is nothing to keep clear of, nan where q is not finite."""
+        if not self._pairs:
+            return np.where(np.isfinite(q).all(axis=1), np.inf, np.nan)
         return np.array([self._smallest(one) if np.all(np.isfinite(one)) else np.nan for one in q])
 
     def _smallest(self, q: Array) -> float:

@@ -16,11 +16,13 @@ from pipeline.common.arrays import Array
 from pipeline.evaluation.base import BaseMotion, angle_between, base_motion, entered_cycle
 from pipeline.evaluation.between import between_knots
 from pipeline.evaluation.clearance import Clearance
-from pipeline.evaluation.curve import OffPath, off_path, steps_needed, turns_of_cycle
+from pipeline.evaluation.curve import OffPath, off_path
 from pipeline.evaluation.limits import LIMITS, limit_excess
 from pipeline.evaluation.plant import SinglePlant
-from pipeline.evaluation.sums import differences, running_integral, weighted_sum
+from pipeline.evaluation.sums import derivatives, running_integral, weighted_sum
+from pipeline.problem.curve import turns_of_cycle
 from pipeline.problem.problem import Boundary, Problem
+from pipeline.problem.resolution import steps_needed, strays
 from pipeline.problem.solution import Solution, Status
 
 
@@ -29,7 +31,8 @@ class Evaluation:
     """One motion and all that is known of it. Shapes: N + 1 knots, n joints; SI units. What the base does is in `base`.
 
     Velocities, accelerations and torques are backward differences at the knots (Global paper Section 4): the sum
-    1/2 qd_i' M(q_i) qd_i dt_i is the kinetic-energy integral that the documents print.
+    1/2 qd_i' M(q_i) qd_i dt_i is the kinetic-energy integral that the documents print. Those of a motion that is a
+    spline are its derivatives, and its integrals are those of the curve.
     """
 
     solution: Solution
@@ -116,45 +119,51 @@ def evaluate(problem: Problem, solution: Solution) -> Evaluation:
     arm, task, trajectory = problem.task.arm, problem.task, solution.trajectory
     time, q = trajectory.time, trajectory.q
     dt = np.diff(time)
-    qd, qdd = differences(trajectory, problem.boundary, problem.reference.timing.at_rest)
+    qd, qdd, jerk = derivatives(trajectory, problem.boundary, problem.reference.timing.at_rest)
     plant = SinglePlant(arm)
     if arm.base.kind == "floating" and problem.boundary is Boundary.CYCLIC:
         qd, qdd = entered_cycle(plant, trajectory, qd)
     count, n = q.shape
-    tau, energy, radius = np.full((count, n), np.nan), np.full(count, np.nan), np.full(count, np.nan)
-    skeleton, singular = np.full((count, n - arm.base.count + 1, 3), np.nan), np.full(count, np.nan)
+    tau, energy = np.full((count, n), np.nan), np.full(count, np.nan)
+    skeleton, radius, singular = np.full((count, n - arm.base.count + 1, 3), np.nan), *np.full((2, count), np.nan)
     place, way = np.full((count, 3), np.nan), np.full((count, 3, 3), np.nan)
     tracking, turned, targets = np.full(count, np.nan), np.full(count, np.nan), problem.reference.position(time)
-    for i in np.flatnonzero(np.isfinite(np.hstack([q, qd, qdd])).all(axis=1)):  # Drake refuses other values
+    finite = np.flatnonzero(np.isfinite(np.hstack([q, qd, qdd])).all(axis=1))  # Drake refuses other values
+    inertia, jacobian = [], []
+    for i in finite:
         plant.at(q[i], qd[i])
         energy[i] = plant.kinetic_energy()
         tau[i] = plant.torque(qdd[i])
         spread = plant.motion_map()
-        radius[i] = np.linalg.eigvalsh(spread.T @ plant.mass_matrix() @ spread)[-1]
+        inertia.append(spread.T @ plant.mass_matrix() @ spread)
+        jacobian.append(plant.task_jacobian(task) @ spread)
         skeleton[i], (place[i], way[i]) = plant.skeleton(), plant.base()
-        singular[i] = np.linalg.svd(plant.task_jacobian(task) @ spread, compute_uv=False)[-1]
         tracking[i], turned[i] = plant.task_error(task, targets[i])
-    # At the first knot nothing has been spent yet: the interval's values stand at its end.
-    tau[0] = tau[0] if problem.boundary is Boundary.CYCLIC else 0.0
+    if len(finite):
+        radius[finite] = np.linalg.eigvalsh(inertia)[:, -1]
+        singular[finite] = np.linalg.svd(jacobian, compute_uv=False)[:, -1]
+    # By differences nothing has been spent yet at the first knot: an interval's values stand at its end.
+    smooth = trajectory.ends is not None
+    tau[0] = tau[0] if problem.boundary is Boundary.CYCLIC or smooth else 0.0
     position = skeleton[:, -1]
     distances = Clearance(arm, problem.obstacles)
     clearance = distances(q)
     turn = angle_between(plant.start, way)
-    excess = limit_excess(problem, q, qd, tau, float(clearance.min()), float(turn.max()))
-    spline_integral, spline_objective, clear_between, excess_between = between_knots(
-        problem, plant, distances, trajectory, qd[0]
-    )
-    off = off_path(problem, plant, time, q)
+    excess = limit_excess(problem, q, qd, tau, float(clearance.min()), float(turn.max()), qdd=qdd, jerk=jerk)
+    between = between_knots(problem, plant, distances, trajectory, qd[0])
+    off = off_path(problem, plant, trajectory)
     secondary = np.array([plant.secondary(problem, qi) for qi in q]) if problem.objective.secondary else np.zeros(count)
     moving = q
     q, qd, qdd, tau = (values[:, arm.joints] for values in (q, qd, qdd, tau))
     base = base_motion(problem, solution, place, way, turn, (q, qd, qdd))
     rates = {"kinetic_energy": energy, "torque": (tau**2).sum(axis=1), "velocity_norm": (qd**2).sum(axis=1)}
     integrals = {name: running_integral(rate, dt) for name, rate in rates.items()} | base.integrals
+    if smooth:
+        integrals |= {name: between.running[name] for name in rates}
 
     status, message = solution.status, solution.message
-    if status is Status.SOLVED:
-        status, message = _judge(moving, tracking, turned, excess, solution)
+    if status in (Status.SOLVED, Status.SINGULAR):
+        status, message = _judge(moving, tracking, turned, between.limit_excess if smooth else excess, solution)
     if status is Status.SOLVED:
         status, message = _judge_between(problem, off, tracking, turned, solution)
     return Evaluation(
@@ -174,24 +183,26 @@ def evaluate(problem: Problem, solution: Solution) -> Evaluation:
         kinetic_energy=energy,
         integrals=integrals,
         secondary=secondary,
-        objective=weighted_sum(
+        objective=between.objective
+        if smooth
+        else weighted_sum(
             problem,
             {name: float(running[-1]) for name, running in integrals.items()},
             float(np.trapezoid(secondary, time)),
         ),
-        objective_spline=spline_objective,
+        objective_spline=between.objective,
         singular_value=singular,
         spectral_radius=radius,
-        energy_integral_spline=spline_integral,
+        energy_integral_spline=between.energy,
         tracking_error_between=off.distance,
         orientation_error_between=off.angle,
         on_path=bool(
             off.distance <= problem.reference.tolerance and off.angle <= problem.reference.orientation_tolerance
         ),
         clearance=clearance,
-        clearance_between=clear_between,
+        clearance_between=between.clearance,
         limit_excess=excess,
-        limit_excess_between=excess_between,
+        limit_excess_between=between.limit_excess,
         base=base,
     )
 
@@ -199,9 +210,10 @@ def evaluate(problem: Problem, solution: Solution) -> Evaluation:
 def _judge(
     q: Array, tracking: Array, turned: Array, excess: dict[str, float], solution: Solution
 ) -> tuple[Status, str]:
-    if not np.all(np.isfinite(q)):
+    promised = solution.trajectory.time <= solution.until
+    if not np.all(np.isfinite(q[promised])):
         return Status.UNCONFIRMED, "the motion holds values that are not finite"
-    for error, unit in ((tracking, "m"), (turned, "rad")):
+    for error, unit in ((tracking[promised], "m"), (turned[promised], "rad")):
         worst = int(np.argmax(error))
         if error[worst] > solution.tracking_tolerance:
             return Status.UNCONFIRMED, (
@@ -212,7 +224,7 @@ def _judge(
     for kind in solution.limits_kept:
         if excess.get(kind, 0.0) > LIMITS:
             return Status.UNCONFIRMED, f"a {kind} limit is exceeded by {100 * excess[kind]:.2g} %"
-    return Status.SOLVED, solution.message
+    return solution.status, solution.message
 
 
 def _judge_between(
@@ -221,37 +233,41 @@ def _judge_between(
     """The curve that is exported: between the knots it may be off by the tolerances of the path more than at them,
     where the method's own promise holds; and what there is to say of a cycle that winds.
     """
-    message = solution.message
-    reference, time, arm = problem.reference, solution.trajectory.time, problem.task.arm
-    for error, own, allowed, unit, key, moment in (
-        (off.distance, tracking, reference.tolerance, "m", "tolerance", off.when[0]),
-        (off.angle, turned, reference.orientation_tolerance, "rad", "orientation_tolerance", off.when[1]),
+    notes = [solution.message] if solution.message else []
+    reference, arm = problem.reference, problem.task.arm
+    for which, (error, own, allowed, unit, key) in enumerate(
+        (
+            (off.distance, tracking, reference.tolerance, "m", "tolerance"),
+            (off.angle, turned, reference.orientation_tolerance, "rad", "orientation_tolerance"),
+        )
     ):
-        if error > allowed and not message:
+        where = (
+            f"between its knots the motion is up to {error:.2g} {unit} off its path (at t = {off.when[which]:.3g} s)"
+        )
+        if solution.knots_only and error > own.max() + max(allowed, strays(problem)[which]):
+            return Status.UNCONFIRMED, "; ".join([f"{where}: too few knots to show it ({solution.grid})", *notes])
+        if error > own.max() + allowed and not solution.knots_only:
+            said = f"{where}, more than path.{key} = {allowed:g} {unit}; {_advice(problem, solution, error, which)}"
+            return Status.UNCONFIRMED, "; ".join([said, *notes])
+        if error > allowed:
             promise = (
                 "which promises its knots alone" if solution.knots_only else "within what it promises at its knots"
             )
-            message = f"up to {error:.2g} {unit} off its path, {promise}"
-        if error > own.max() + allowed and not solution.knots_only:
-            return Status.UNCONFIRMED, (
-                f"between its knots the motion is up to {error:.2g} {unit} off its path (at t = {moment:.3g} s), "
-                f"more than path.{key} = {allowed:g} {unit}; {_advice(problem, time, error, allowed)}"
-            )
+            notes.append(f"up to {error:.2g} {unit} off its path, {promise}")
     turns = (
         turns_of_cycle(problem, solution.trajectory.q[:, arm.joints]) if problem.boundary is Boundary.CYCLIC else None
     )
     if turns is not None and np.any(turns):
         names = arm.description.joints[arm.base.count :]
         wound = [f"{name} {turn / (2 * np.pi):+.0f}" for name, turn in zip(names, turns, strict=True) if turn]
-        message = "; ".join(filter(None, [message, f"the cycle closes up to full turns: {', '.join(wound)}"]))
-    return Status.SOLVED, message
+        notes.append(f"the cycle closes up to full turns: {', '.join(wound)}")
+    return Status.SOLVED, "; ".join(notes)
 
 
-def _advice(problem: Problem, time: Array, error: float, allowed: float) -> str:
-    """Which grid would do: that of the problem, or where a method has its own, its step."""
-    needed = steps_needed(problem, time, error, allowed)
+def _advice(problem: Problem, solution: Solution, error: float, which: int) -> str:
+    """Which knots would do, by the key that they come from: a number of intervals, or a step [s]."""
+    needed = steps_needed(problem, solution.trajectory.time, error, which)
     if needed is None:
         return "no finer grid helps: the motion does not follow the path between its knots"
-    if len(time) == len(problem.times):
-        return f"timing.steps = {needed} would do"
-    return f"a step of {problem.reference.duration / needed:.2g} s would do in place of {np.diff(time).max():.2g} s"
+    counts = solution.grid == "timing.steps"
+    return f"{solution.grid} = {needed if counts else f'{problem.reference.duration / needed:.2g}'} would do"

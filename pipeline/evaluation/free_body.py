@@ -1,9 +1,9 @@
 """What a base does and feels, from a plant that shares nothing with the solver's: Drake's free body with a quaternion.
 
 Where the base floats, its motion is found again from the joint motion alone: the cubic spline through the joints' knots
-drives it, and the momentum equation M_bb V = p - M_bm qd_m is integrated by RK4. Momentum is then computed from that
-motion by Drake, between the steps. Where the base stands still, the force and torque that hold it are the inverse
-dynamics of the same plant.
+drives it, and the momentum equation M_bb V = p - M_bm qd_m, in the base's own frame, is integrated by RK4. Momentum is
+then computed from that motion by Drake, between the steps. Where the base stands still, the force and torque that hold
+it are the inverse dynamics of the same plant.
 """
 
 from __future__ import annotations
@@ -24,9 +24,8 @@ from pipeline.model.arm import Arm
 from pipeline.problem.problem import Problem
 
 STEPS = 1000  # of RK4 at least, along the whole motion
-
-
 LEAST = 4  # of them in every interval
+IDENTITY = np.array([0.0, 0.0, 0.0, 1.0])
 
 
 @dataclass(frozen=True)
@@ -76,13 +75,28 @@ class BasePlant:
         self.plant.SetPositions(self.context, x)
         self.plant.SetVelocities(self.context, v)
 
-    def follow(self, position: Array, quaternion: Array, q: Array, qd: Array, momentum: Array) -> Array:
-        """[w, v] (6,) of the base at which the system has `momentum` (6,): linear, and angular about the start."""
-        self.at(position, quaternion, q, np.concatenate([np.zeros(6), qd]))
-        inertia = np.asarray(self.plant.CalcMassMatrix(self.context))
-        angular = momentum[3:] - np.cross(position - self.start[1], momentum[:3])
-        wanted = np.concatenate([angular, momentum[:3]]) - inertia[np.ix_(self.base, self.joints)] @ qd
-        return np.linalg.solve(inertia[np.ix_(self.base, self.base)], wanted)
+    def driven(self, q: Array, qd: Array) -> tuple[Array, Array]:
+        """Of joints (K, joints) in the root link's own frame: the base's velocity [w, v] (K, 6) without momentum, and
+        what each unit of momentum [angular, linear] adds to it (K, 6, 6). Neither depends on the base's pose.
+        """
+        rows, columns = np.ix_(self.base, self.base), np.ix_(self.base, self.joints)
+        own, coupled = np.empty((len(q), 6, 6)), np.empty((len(q), 6, q.shape[1]))
+        for i in range(len(q)):
+            self.at(np.zeros(3), IDENTITY, q[i], np.zeros(6 + q.shape[1]))
+            inertia = np.asarray(self.plant.CalcMassMatrix(self.context))
+            own[i], coupled[i] = inertia[rows], inertia[columns]
+        adds = np.linalg.inv(own)
+        return -(adds @ (coupled @ qd[:, :, None]))[:, :, 0], adds
+
+    def velocity(self, position: Array, quaternion: Array, alone: Array, adds: Array, momentum: Array) -> Array:
+        """[w, v] (6,) of the base in the world at which the system has `momentum` (6,): linear, and angular about the
+        start. alone (6,) and adds (6, 6) from `driven`.
+        """
+        way = _matrix(quaternion)
+        if momentum.any():
+            angular = momentum[3:] - np.cross(position - self.start[1], momentum[:3])
+            alone = alone + adds @ np.concatenate([angular @ way, momentum[:3] @ way])
+        return np.concatenate([way @ alone[:3], way @ alone[3:]])
 
     def momentum(self) -> Array:
         """Linear momentum, and angular momentum about the start (6,), in the world."""
@@ -121,9 +135,11 @@ def integrate(problem: Problem, time: Array, q: Array) -> FreeMotion:
     quaternion, position = plant.start
     states = [np.concatenate([quaternion, position])]
 
-    def rate(state: Array, q: Array, qd: Array) -> Array:
-        unit = state[:4] / np.sqrt(state[:4] @ state[:4])
-        both = plant.follow(state[4:], unit, q, qd, momentum)
+    stages = np.interp(np.arange(2 * len(fine) - 1) / 2, np.arange(len(fine)), fine)  # RK4's: ends and middles
+    alone, adds = plant.driven(joints(stages), joints(stages, 1))
+
+    def rate(state: Array, i: int) -> Array:
+        both = plant.velocity(state[4:], state[:4], alone[i], adds[i], momentum)
         (wx, wy, wz), (x, y, z, r) = both[:3], state[:4]
         # dq/dt = (w, 0) q / 2 for an angular velocity w in the world.
         turned = (
@@ -134,14 +150,12 @@ def integrate(problem: Problem, time: Array, q: Array) -> FreeMotion:
         )
         return np.concatenate([np.multiply(turned, 0.5), both[3:]])
 
-    middle = (fine[1:] + fine[:-1]) / 2
-    (at, at_rate), (half, half_rate) = ((joints(t), joints(t, 1)) for t in (fine, middle))
     for i, h in enumerate(np.diff(fine)):
         state = states[-1]
-        k1 = rate(state, at[i], at_rate[i])
-        k2 = rate(state + h / 2 * k1, half[i], half_rate[i])
-        k3 = rate(state + h / 2 * k2, half[i], half_rate[i])
-        k4 = rate(state + h * k3, at[i + 1], at_rate[i + 1])
+        k1 = rate(state, 2 * i)
+        k2 = rate(state + h / 2 * k1, 2 * i + 1)
+        k3 = rate(state + h / 2 * k2, 2 * i + 1)
+        k4 = rate(state + h * k3, 2 * i + 2)
         state = state + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
         state[:4] /= np.sqrt(state[:4] @ state[:4])
         states.append(state)
@@ -174,6 +188,18 @@ def _check(
         plant.at(position[i], quaternion[i], q[i], np.zeros(6 + q.shape[1]))
         off[i] = np.linalg.norm(plant.tip()[rows] - target[i, : len(rows)])
     return FreeMotion(time, position, Rotation.from_quat(quaternion), linear, angular_error, float(off.max()))
+
+
+def _matrix(quaternion: Array) -> Array:
+    """The rotation matrix (3, 3) of a quaternion (4,) of any length, last component real."""
+    x, y, z, r = quaternion / np.sqrt(quaternion @ quaternion)
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * r), 2 * (x * z + y * r)],
+            [2 * (x * y + z * r), 1 - 2 * (x * x + z * z), 2 * (y * z - x * r)],
+            [2 * (x * z - y * r), 2 * (y * z + x * r), 1 - 2 * (x * x + y * y)],
+        ]
+    )
 
 
 def _angular_velocity(quaternion: Array, rate: Array) -> Array:

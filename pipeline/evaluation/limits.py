@@ -8,17 +8,26 @@ from pipeline.common.arrays import Array
 from pipeline.problem.problem import Problem
 
 LIMITS = 1e-6  # relative: how well a method that promises limits must keep them at its knots
+STILL = np.zeros(1)
 
 
 def limit_excess(
-    problem: Problem, q: Array, qd: Array, tau: Array, clearance: float = np.inf, turn: float = 0.0
+    problem: Problem,
+    q: Array,
+    qd: Array,
+    tau: Array,
+    clearance: float = np.inf,
+    turn: float = 0.0,
+    *,
+    qdd: Array = STILL,
+    jerk: Array = STILL,
 ) -> dict[str, float]:
     """By how much each kind of limit is exceeded, relative to its size (positions: to half the range; clearances: to
     the margin); <= 0 if kept. turn [rad]: of the base from its start.
     """
     if not problem.constrained or not np.all(np.isfinite(q)):
         return {}
-    found = {kind: float(excess.max()) for kind, excess in excesses(problem, q, qd, tau).items()}
+    found = {kind: float(excess.max()) for kind, excess in excesses(problem, q, qd, tau, qdd, jerk).items()}
     if problem.obstacles is not None:
         found["clearance"] = 1 - clearance / problem.obstacles.margin
     if np.isfinite(problem.bounds.attitude):
@@ -26,14 +35,19 @@ def limit_excess(
     return found
 
 
-def excesses(problem: Problem, q: Array, qd: Array, tau: Array) -> dict[str, Array]:
+def excesses(
+    problem: Problem, q: Array, qd: Array, tau: Array, qdd: Array = STILL, jerk: Array = STILL
+) -> dict[str, Array]:
     """The same (K, n) for every sample and joint, of the kinds that are limited."""
     limits = problem.bounds
     half = np.where(np.isfinite(limits.upper - limits.lower), (limits.upper - limits.lower) / 2, 1.0)
     kinds = {
         "position": (np.maximum(q - limits.upper, limits.lower - q) / half, np.minimum(-limits.lower, limits.upper)),
         "velocity": (np.abs(qd) / limits.velocity - 1, limits.velocity),
+        "acceleration": (np.abs(qdd) / limits.acceleration - 1, limits.acceleration),
+        "jerk": (np.abs(jerk) / limits.jerk - 1, limits.jerk),
         "torque": (np.abs(tau) / limits.torque - 1, limits.torque),
         "power": (np.abs(tau * qd) / limits.power - 1, limits.power),
     }
-    return {kind: excess for kind, (excess, bound) in kinds.items() if np.isfinite(bound).any()}
+    limited = {kind: excess for kind, (excess, bound) in kinds.items() if np.isfinite(bound).any()}
+    return {kind: np.broadcast_to(excess, q.shape) for kind, excess in limited.items()}

@@ -70,25 +70,21 @@ class SinglePlant:
         plant.Finalize()
         self.end, self.joints = parts.end, parts.joints
         self.order = np.array([joint.position_start() for joint in self.joints])
+        self.place = np.argsort(self.order)
         self.arm, self.nb = arm, arm.base.count
         self.root = plant.GetBodyByName(arm.description.drake_name(arm.description.base), parts.model)
         self.context = plant.CreateDefaultContext()
         self.forces = MultibodyForces(plant)
 
-    def _scatter(self, values: Array) -> Array:
-        out = np.zeros(len(self.order))
-        out[self.order] = values
-        return out
-
     def at(self, q: Array, qd: Array) -> None:
-        self.plant.SetPositionsAndVelocities(self.context, np.concatenate([self._scatter(q), self._scatter(qd)]))
+        self.plant.SetPositionsAndVelocities(self.context, np.concatenate([q[self.place], qd[self.place]]))
 
     def kinetic_energy(self) -> float:
         return float(self.plant.CalcKineticEnergy(self.context))
 
     def torque(self, qdd: Array) -> Array:
         # Drake's inverse dynamics leaves gravity to the caller.
-        tau = self.plant.CalcInverseDynamics(self.context, self._scatter(qdd), self.forces)
+        tau = self.plant.CalcInverseDynamics(self.context, qdd[self.place], self.forces)
         return np.asarray(tau - self.plant.CalcGravityGeneralizedForces(self.context))[self.order]
 
     def mass_matrix(self) -> Array:
@@ -114,8 +110,7 @@ class SinglePlant:
 
     def motion_map(self) -> Array:
         """All velocities by the joints' (N, n): [-M_bb^-1 M_bm; I] if the base floats, [0; I] if it stands still."""
-        n, nb = len(self.order), self.nb
-        out = np.vstack([np.zeros((nb, n - nb)), np.eye(n - nb)])
+        nb, out = self.nb, np.eye(len(self.order))[:, self.nb :]
         if self.arm.base.kind == "floating":
             inertia = self.mass_matrix()
             out[:nb] = -np.linalg.solve(inertia[:nb, :nb], inertia[:nb, nb:])

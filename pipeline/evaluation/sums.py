@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from pipeline.common.arrays import Array
 from pipeline.problem.problem import Boundary, Problem
@@ -25,6 +26,17 @@ def differences(trajectory: Trajectory, boundary: Boundary, at_rest: bool) -> tu
     qd = np.vstack([first, step])
     change = np.diff(qd, axis=0) / dt
     return qd, np.vstack([change[-1] if boundary is Boundary.CYCLIC else np.zeros_like(first), change])
+
+
+def derivatives(trajectory: Trajectory, boundary: Boundary, at_rest: bool) -> tuple[Array, Array, Array]:
+    """qd, qdd, jerk (N + 1, n): a spline's, its jerk that of the interval before each knot; else by differences."""
+    time, ends = trajectory.time, trajectory.ends
+    if ends is None:
+        qd, qdd = differences(trajectory, boundary, at_rest)
+        jerk = np.diff(qdd, axis=0) / np.diff(time)[:, None]
+        return qd, qdd, np.vstack([np.zeros_like(qdd[:1]), jerk])
+    spline = CubicSpline(time, trajectory.q, bc_type=((1, ends[0]), (1, ends[1])))
+    return spline(time, 1), spline(time, 2), 6 * np.vstack([spline.c[0, :1], spline.c[0]])
 
 
 def weighted_sum(problem: Problem, integrals: Mapping[str, float], secondary: float) -> float:

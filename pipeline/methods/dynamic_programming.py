@@ -1,16 +1,17 @@
-"""Dynamic programming on a grid of the self-motion manifold (r = 1): the global optimum of the discretised problem.
+"""Dynamic programming on a grid of the self-motion manifold (r = 1): the cheapest path through the grid's nodes.
 
 Every knot's manifold is sampled evenly in arc length (all loops: `self_motion.py`), and Bellman's recursion
 V_i(b) = min_a V_(i-1)(a) + 1/2 d' M(q_b) d / dt_i, with d = q_b - q_a the joint difference of one interval, runs over
 all pairs of nodes, so that it needs no assumption on how the manifold changes along the path (other terms of first
-order: `manifold_grid.py`). The sum is the kinetic-energy integral by backward differences (PMKE paper eq. (4), Global
+order: `grid.py`). The sum is the kinetic-energy integral by backward differences (PMKE paper eq. (4), Global
 paper eq. (5)). Every path of the grid keeps the task at its knots and is feasible for the transcription on the same
-knots: the cost bounds that program's optimum from above, and its excess, the grid error, is of second order in the
-node spacing.
+knots: the cost bounds that program's optimum from above. Its excess, the grid error, is of second order in the node
+spacing and can only be estimated here: cheaper motions may pass between the nodes (a bound: `lower_bound.py`).
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
@@ -20,8 +21,10 @@ from pipeline.common.arrays import Array
 from pipeline.config.methods import DynamicProgrammingOptions
 from pipeline.methods.method import Context, Method, Serves
 from pipeline.model.kinematics import wrap
+from pipeline.problem.costs import objective_values
 from pipeline.problem.problem import Boundary, Problem
 from pipeline.problem.solution import Solution, Status, Trajectory
+from pipeline.program.transcription import transcribe
 from pipeline.search.grid import Grid, Index, make_grid
 from pipeline.search.selection import distinct
 
@@ -32,7 +35,7 @@ STRIDE = 8  # first spacing, in nodes, of the starts that a cyclic problem is so
 
 
 def solve(problem: Problem, options: DynamicProgrammingOptions, context: Context) -> list[Solution]:
-    """Distinct grid optima on the grid's own knots, best first; the first is the global one, with its grid error.
+    """Distinct grid optima on the grid's own knots, best first; the first with an estimate of its grid error.
 
     Torque and power limits are not part of a first-order grid: with them the costs are those of a relaxed problem.
     """
@@ -45,7 +48,8 @@ def solve(problem: Problem, options: DynamicProgrammingOptions, context: Context
         message = "no path through the grid keeps the limits; more nodes or fewer intervals make it finer than them"
         return [Solution("dynamic_programming", Trajectory(times, standing), Status.INFEASIBLE, message, found=False)]
     context.progress(1, 1, float(costs[kept[0]]))
-    log: dict[str, Any] = {**_errors(grid, problem.boundary, float(costs[kept[0]])), "spacing_rad": grid.spacing}
+    log: dict[str, Any] = {**_errors(problem, grid, motions[kept[0]], float(costs[kept[0]]))}
+    log["spacing_rad"] = grid.spacing
     log["loops"] = [len(layer.loops) for layer in grid.layers]
     return [
         Solution(
@@ -55,6 +59,7 @@ def solve(problem: Problem, options: DynamicProgrammingOptions, context: Context
             optimum=rank + 1,
             tracking_tolerance=TRACKING,
             knots_only=True,
+            grid="method.dynamic_programming.intervals",
             limits_kept=("position", "velocity", "clearance"),
             statistics={"cost": float(costs[index]), **(log if rank == 0 else {})},
         )
@@ -67,7 +72,7 @@ dynamic_programming = Method(
     "Dynamic programming",
     "#5A6472",
     DynamicProgrammingOptions,
-    Serves(redundancy=1, order=1, moving_base=False),
+    Serves(redundancy=1, order=1, moving_base=False, rest=False),
     solve,
 )
 
@@ -95,22 +100,28 @@ def _distinct(problem: Problem, motions: Array, costs: Array, same_path: float) 
     return [int(usable[i]) for i in distinct(motions[usable], costs[usable], len(usable), same_path, revolute)]
 
 
-def _errors(grid: Grid, boundary: Boundary, cost: float) -> dict[str, float]:
-    """Grid errors of the best cost [J s] by halving.
+def _errors(problem: Problem, grid: Grid, motion: Array, cost: float) -> dict[str, float]:
+    """Grid errors of the best motion (N + 1, n) and its cost [J s], estimates both.
 
-    grid_error: what the cost falls by from half the nodes to all of them. What is left to fall is of second order, a
-    third of that, but paths on a grid are ragged: taken whole, it bounds the excess with some margin.
+    grid_error: by how much that cost is too high, for what is known: the larger of what it falls by when the motion is
+    solved on its knots with joints that need not be at nodes, and of what it fell by from half the nodes to all. The
+    latter alone says nothing where both grids have the same best path.
     interval_error: what is left to change with the intervals, of first order (backward differences), signed.
     """
 
     def best(of: Grid) -> float:
-        return float(paths(of, boundary)[1].min(initial=np.inf))
+        return float(paths(of, problem.boundary)[1].min(initial=np.inf))
 
     coarse = grid.thin_intervals()
     coarse_cost = best(coarse)
     drop, coarse_drop = best(grid.thin_nodes()) - cost, best(coarse.thin_nodes()) - coarse_cost
     interval_error = (coarse_cost - coarse_drop / 3) - (cost - drop / 3)
-    return {"grid_error": drop, "interval_error": interval_error}
+    free = np.full(problem.task.arm.n, np.inf)
+    bounds = replace(problem.bounds, torque=free, power=free)
+    relaxed = replace(problem, times=grid.times, limits=bounds, bounds_of_integrals={})
+    q, outcome, _ = transcribe(relaxed, grid.times, motion).solve()
+    excess = cost - float(objective_values(relaxed, grid.times, q[None])[0]) if outcome.converged else 0.0
+    return {"grid_error": max(drop, excess), "interval_error": interval_error}
 
 
 def _intervals(problem: Problem, intervals: int | None) -> Array:

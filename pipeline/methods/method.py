@@ -23,7 +23,8 @@ class Serves:
     redundancy: the only degree r served; None: any. order: the highest derivative in the objective, 1 for one of
     positions and velocities, 2 for one of accelerations too (torques, reactions). constraints: whether there may be
     limits or obstacles. orientation: whether the task may prescribe one. moving_base: whether the arm may stand on a
-    base that floats, or that is held so that what it feels can count.
+    base that floats, or that is held so that what it feels can count. rest: whether the joints may be
+    told to rest at an end, or their accelerations and jerks be limited.
     """
 
     redundancy: int | None = None
@@ -32,6 +33,7 @@ class Serves:
     constraints: bool = True
     orientation: bool = True
     moving_base: bool = True
+    rest: bool = True
 
     def why_not(self, problem: Problem) -> str | None:
         """The first condition that `problem` does not meet and what is supported, without full stop; None if served."""
@@ -52,6 +54,8 @@ class Serves:
             return f"the boundary is {boundary.value}"
         if not self.constraints and problem.constrained:
             return "the problem has limits or obstacles"
+        if not self.rest and (any(problem.rest) or problem.bounds.smooth):
+            return "the joints are to rest at an end, or their accelerations are limited"
         if not self.orientation and task.m > len(task.axes):
             return "the task prescribes orientations"
         return None
@@ -71,6 +75,8 @@ class Serves:
             parts.append("no limits or obstacles")
         if not self.moving_base:
             parts.append("arms on a fixed base")
+        if not self.rest:
+            parts.append("motions without boundary.rest and limits of acceleration or jerk")
         return "are " + "; ".join(parts) if parts else "is every problem"
 
 
@@ -86,6 +92,7 @@ def _contradiction(problem: Problem) -> str | None:
 
 
 ANY = Serves()
+ON_KNOTS = Serves(rest=False)  # by differences, which know no rest
 
 
 @dataclass(frozen=True)

@@ -18,9 +18,10 @@ from scipy.spatial.distance import squareform
 
 from pipeline.common.arrays import Array
 from pipeline.config.methods import ParetoOptions
+from pipeline.methods.global_planner.grids import finer
 from pipeline.methods.global_planner.optimum import stays_on_path
 from pipeline.methods.global_planner.planner import TRACKING, global_planner
-from pipeline.methods.method import ANY, Context, Method
+from pipeline.methods.method import ON_KNOTS, Context, Method
 from pipeline.problem.costs import integrals
 from pipeline.problem.limits import LIMIT_KINDS
 from pipeline.problem.objective import Objective
@@ -66,7 +67,20 @@ class Point:
 
 
 def solve(problem: Problem, options: ParetoOptions, context: Context) -> list[Solution]:
-    """The front's motions, from one extreme to the other. The first's statistics hold `front`, a row per point."""
+    """The front's motions, from one extreme to the other, on the planner's knots or finer ones where one of them would
+    leave its path. The first's statistics hold `front`, a row per point.
+    """
+    while True:
+        solutions = _front(problem, options, context)
+        time = solutions[0].trajectory.time
+        motions = [solution.trajectory.q for solution in solutions if solution.status is Status.SOLVED]
+        times = finer(replace(problem, times=time), options.planner.refine_to, motions)
+        if times is None:
+            return solutions
+        problem = replace(problem, times=times)
+
+
+def _front(problem: Problem, options: ParetoOptions, context: Context) -> list[Solution]:
     first, second = options.objectives
     known: list[Array] = []
     found: dict[str, Point] = {}
@@ -79,6 +93,8 @@ def solve(problem: Problem, options: ParetoOptions, context: Context) -> list[So
         if optima[0].status is not Status.SOLVED:
             message = f"the extreme of {own} was not found: {optima[0].message or optima[0].status.value}"
             return [replace(optima[0], method="pareto", message=message)]
+        if len(optima[0].trajectory.time) > len(problem.times):  # all points on the same knots
+            return _front(replace(problem, times=optima[0].trajectory.time), options, context)
         known += [optimum.trajectory.q for optimum in optima]
         weights = (1.0, 0.0) if own == first else (0.0, 1.0)
         q = optima[0].trajectory.q
@@ -89,7 +105,8 @@ def solve(problem: Problem, options: ParetoOptions, context: Context) -> list[So
     if not np.all(worst - best > IMPROVED * np.abs(best)):
         return _report(problem, extremes, options)  # one motion is best in both: there is nothing to trade
     between = replace(problem, objective=_weighted(options, 1 / (worst - best)))
-    known += [s.trajectory.q for s in global_planner(between, options.planner, context) if s.status is Status.SOLVED]
+    compromises = global_planner(between, replace(options.planner, refine_to=None), context)
+    known += [solution.trajectory.q for solution in compromises if solution.status is Status.SOLVED]
 
     points = _points(options, best, worst)
     points = _try(problem, options, points, [(i, q) for i in range(len(points)) for q in known], context)
@@ -114,7 +131,7 @@ def refuses(problem: Problem, options: ParetoOptions) -> str | None:
     return next((why for own in each if (why := global_planner.why_not(own, options.planner))), None)
 
 
-pareto = Method("pareto", "Pareto point", "#2F855A", ParetoOptions, ANY, solve, refuses)
+pareto = Method("pareto", "Pareto point", "#2F855A", ParetoOptions, ON_KNOTS, solve, refuses)
 
 
 def _points(options: ParetoOptions, best: Array, worst: Array) -> list[Point]:
@@ -229,6 +246,7 @@ def _report(problem: Problem, points: Sequence[Point], options: ParetoOptions) -
                     optimum=rank + 1,
                     tracking_tolerance=TRACKING,
                     limits_kept=LIMIT_KINDS,
+                    knots_only=options.planner.refine_to is None,
                 )
             )
     solutions[0].statistics.update({"front": rows, "objectives": list(options.objectives)})

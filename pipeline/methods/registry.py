@@ -5,6 +5,7 @@ from __future__ import annotations
 from pipeline.methods.calculus_of_variations.stationary import calculus_of_variations
 from pipeline.methods.dynamic_programming import dynamic_programming
 from pipeline.methods.global_planner.planner import global_planner
+from pipeline.methods.lower_bound import lower_bound
 from pipeline.methods.lsv import inertia_weighted, lsv
 from pipeline.methods.pareto import pareto
 from pipeline.methods.pmke.predictive import pmke
@@ -22,6 +23,7 @@ METHODS = {
         global_planner,
         pareto,
         dynamic_programming,
+        lower_bound,
         calculus_of_variations,
         pontryagin,
         pontryagin_as_printed,

@@ -21,15 +21,26 @@ class SingularityWatch:
 
     def __init__(self, threshold: float, max_drift: float) -> None:
         self.threshold, self.max_drift, self.time, self.smallest = threshold, max_drift, 0.0, np.inf
+        self.first = np.inf  # [s] when it fell below the threshold
 
     def see(self, time: float, jacobian: Array) -> None:
         ratio = float(singular_value_ratio(jacobian))
+        if ratio < self.threshold:
+            self.first = min(self.first, float(time))
         if ratio < self.smallest:
             self.time, self.smallest = float(time), ratio
 
     def judge(self, method: str, trajectory: Trajectory, statistics: dict[str, Any]) -> Solution:
-        statistics = {**statistics, "smallest_singular_value_ratio": self.smallest}
-        if self.smallest >= self.threshold:
-            return Solution(method, trajectory, Status.SOLVED, tracking_tolerance=self.max_drift, statistics=statistics)
+        singular = self.smallest < self.threshold
         message = f"singular at t = {self.time:.2f} s (smallest singular value {self.smallest:.1e} of the largest)"
-        return Solution(method, trajectory, Status.SINGULAR, message, event_time=self.time, statistics=statistics)
+        return Solution(
+            method,
+            trajectory,
+            Status.SINGULAR if singular else Status.SOLVED,
+            message if singular else "",
+            event_time=self.time if singular else None,
+            tracking_tolerance=self.max_drift,
+            until=self.first,
+            grid=f"method.{method}.dt",
+            statistics={**statistics, "smallest_singular_value_ratio": self.smallest},
+        )

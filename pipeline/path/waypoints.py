@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import difflib
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path as File
@@ -16,6 +17,7 @@ from pipeline.common.arrays import Array
 from pipeline.common.errors import PathError
 
 ROLL_PITCH_YAW, QUATERNION, TIME = ("roll", "pitch", "yaw"), ("qx", "qy", "qz", "qw"), "time"
+LARGEST = 1e9  # [m], [rad] and [s]
 MOST = 100_000  # rows: each becomes a piece of a spline
 
 
@@ -62,6 +64,10 @@ def _table(file: File) -> pd.DataFrame:
             lines = (line.partition("#")[0] for line in opened)
             header = next(csv.reader((line for line in lines if line.strip()), skipinitialspace=True), [])
         names = [name.strip() for name in header]
+        if names and all(re.fullmatch(r"[+-]?[0-9.]+(e[+-]?[0-9]+)?", name) for name in names):
+            raise PathError(
+                f"path.file = {file}: the first row is {', '.join(names)}; expected a header that names the columns"
+            )
         repeated = sorted({name for name in names if names.count(name) > 1})
         if repeated:
             raise PathError(f"path.file = {file}: the header has the column {', '.join(repeated)} twice")
@@ -116,9 +122,12 @@ def _check_header(file: str | File, header: Sequence[str], axes: Sequence[str]) 
 
 def _numbers(file: str | File, table: pd.DataFrame, names: Sequence[str]) -> Array:
     values = table[list(names)].apply(pd.to_numeric, errors="coerce").to_numpy(dtype=float)
-    bad = np.flatnonzero(~np.isfinite(values).all(axis=1))
+    bad = np.flatnonzero(~(np.abs(values) <= LARGEST).all(axis=1))
     if bad.size:
-        raise PathError(f"path.file = {file}: row {bad[0] + 1} of the data holds a value that is not a finite number")
+        raise PathError(
+            f"path.file = {file}: row {bad[0] + 1} of the data holds a value that is not a finite number of at most "
+            f"{LARGEST:g} in size"
+        )
     return values
 
 

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from pipeline.common.arrays import Array
 from pipeline.model.arm import Arm
 
-LIMIT_KINDS = ("position", "velocity", "torque", "power", "clearance", "attitude")
+LIMIT_KINDS = ("position", "velocity", "acceleration", "jerk", "torque", "power", "clearance", "attitude")
+FREE = np.array(np.inf)
 
 
 @dataclass(frozen=True)
 class Limits:
-    """Bounds (n,) on joint motion; infinite where there are none. Units: rad, rad/s, N m, W.
+    """Bounds (n,) on joint motion; infinite where there are none. Units: rad, rad/s, N m, W, rad/s^2, rad/s^3.
 
     attitude [rad]: by how much a floating base may turn from its start, at any time.
     """
@@ -25,14 +26,24 @@ class Limits:
     torque: Array
     power: Array
     attitude: float = np.inf
+    acceleration: Array = field(default_factory=lambda: FREE)
+    jerk: Array = field(default_factory=lambda: FREE)
 
     @property
     def any(self) -> bool:
         """Whether there is a limit at all."""
-        return any(
-            np.isfinite(bound).any()
-            for bound in (self.lower, self.upper, self.velocity, self.torque, self.power, self.attitude)
+        return (
+            any(
+                np.isfinite(bound).any()
+                for bound in (self.lower, self.upper, self.velocity, self.torque, self.power, self.attitude)
+            )
+            or self.smooth
         )
+
+    @property
+    def smooth(self) -> bool:
+        """Whether accelerations or jerks are limited, which differences cannot keep between their knots."""
+        return bool(np.isfinite(self.acceleration).any() or np.isfinite(self.jerk).any())
 
     @classmethod
     def of(cls, arm: Arm) -> Limits:

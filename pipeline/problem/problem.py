@@ -33,9 +33,10 @@ class Problem:
     """Follow `reference` with the arm of `task`, at least cost, within limits.
 
     q_init: (n,) [rad] the initial configuration (for boundary `free` and `cyclic`: the one that starts are drawn from).
-    times: (N + 1,) [s] the knots of the grid on which a global solution is wanted.
+    times: (N + 1,) [s] the knots of the grid on which a solution is wanted.
     bounds_of_integrals: upper bounds by the names in the catalogue (`integrals.py`), positive; an infinite one is none.
     qd_init: (n,) [rad/s] the velocity that a motion from q_init comes with; None: at rest, or as the path is entered.
+    rest: whether all joints rest at the start, at the end. zero_acceleration: whether they do not accelerate there.
     """
 
     task: Task
@@ -48,6 +49,8 @@ class Problem:
     bounds_of_integrals: Mapping[str, float] = field(default_factory=dict)
     obstacles: Obstacles | None = None
     qd_init: Array | None = None
+    rest: tuple[bool, bool] = (False, False)
+    zero_acceleration: bool = False
 
     def __post_init__(self) -> None:
         for name, bound in self.bounds_of_integrals.items():

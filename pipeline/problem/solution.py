@@ -21,7 +21,7 @@ class Status(enum.Enum):
     SOLVED = "solved: the motion follows the path and the method's own conditions hold"
     SINGULAR = "singular: the method ran into a singular configuration; its motion is not to be used from there on"
     NOT_CONVERGED = "not converged: the solver stopped before its conditions held; try more iterations or more starts"
-    INFEASIBLE = "infeasible: no motion was found that meets the path and every limit"
+    INFEASIBLE = "none found: of what was tried, no motion meets the path and every limit"
     UNCONFIRMED = "unconfirmed: the motion recomputed from q(t) does not do what the method claims"
 
     @property
@@ -31,10 +31,15 @@ class Status(enum.Enum):
 
 @dataclass(frozen=True)
 class Trajectory:
-    """A joint motion: time (N + 1,) [s], q (N + 1, n) [rad]. Everything else is computed from these two."""
+    """A joint motion: time (N + 1,) [s], q (N + 1, n) [rad]. Everything else is computed from these.
+
+    ends: (2, n) [rad/s] the velocities at both ends of a motion that is a spline, the C2 cubic one through its knots;
+    None: of what is known at its knots alone.
+    """
 
     time: Array
     q: Array
+    ends: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -42,9 +47,12 @@ class Solution:
     """What a method returns: its motion, how it ended, and statistics of the solver (never used for reporting costs).
 
     `optimum` counts distinct optima of one method from 1 on. `event_time` [s] is when a singularity was met.
-    `tracking_tolerance` [m] is what the method promises to keep of the path at its knots; the evaluation checks it.
+    `tracking_tolerance` [m] is what the method promises to keep of the path at its knots, `until` a time [s] from which
+    on a singular motion is not to be used; the evaluation checks it.
     `limits_kept` are the kinds of limits that it promises to keep at its knots.
     `knots_only`: it goes from node to node of a grid, and promises nothing of the path between its knots.
+    `grid` is the key of the configuration that its knots come from.
+    `evidence`: what speaks for the motion, in words: how it was found and what confirms it.
     `found` is False where there is no motion to speak of: the trajectory then only holds the arm at its start.
     """
 
@@ -55,9 +63,12 @@ class Solution:
     optimum: int = 1
     event_time: float | None = None
     tracking_tolerance: float = np.inf
+    until: float = np.inf
     limits_kept: tuple[str, ...] = ()
     found: bool = True
     knots_only: bool = False
+    grid: str = "timing.steps"
+    evidence: str = ""
     statistics: dict[str, Any] = field(default_factory=dict)
 
     def to_frame(self) -> pd.DataFrame:

@@ -13,6 +13,7 @@ import numpy as np
 
 from pipeline.common.arrays import Array
 from pipeline.problem.problem import Problem
+from pipeline.program.residuals import residuals
 from pipeline.program.transcription import transcribe
 
 HANDOVER = {
@@ -23,12 +24,16 @@ HANDOVER = {
     "slack_bound_push": 1e-14,
     "slack_bound_frac": 1e-14,
     "nlp_scaling_method": "none",
+    "constr_mult_init_max": 1e8,  # else the first multipliers of long rows are put to zero
+    "acceptable_iter": 3,  # where rounding keeps IPOPT from its last digits, at an optimum it cannot gain any
 }
 
 
 @dataclass(frozen=True)
 class Confirmation:
-    """q (N + 1, n): as IPOPT leaves it; by how much it moved any joint [rad]; its verdict and what that took."""
+    """q (N + 1, n): as IPOPT leaves it; by how much it moved any joint [rad]; its verdict, what that took, and what is
+    left of its conditions (`residuals.py`).
+    """
 
     q: Array
     converged: bool
@@ -36,12 +41,15 @@ class Confirmation:
     iterations: int
     wall_time: float
     moved: float
+    violation: float
+    optimality: float
 
 
-def confirm(problem: Problem, times: Array, q: Array, *, tolerance: float, max_iterations: int) -> Confirmation:
-    """IPOPT's own answer from q (N + 1, n)."""
-    final, outcome, iterations = transcribe(problem, times, q).solve(
-        tolerance=tolerance, max_iterations=max_iterations, extra=HANDOVER
-    )
-    moved = float(np.abs(final - q).max())
-    return Confirmation(final, outcome.converged, outcome.status, iterations, outcome.wall_time, moved)
+def confirm(
+    problem: Problem, times: Array, q: Array, *, tolerance: float, max_iterations: int, keep_off: float = 0.0
+) -> Confirmation:
+    """IPOPT's own answer from q (N + 1, n); keep_off [m]: as in `transcribe`."""
+    program = transcribe(problem, times, q, keep_off=keep_off)
+    final, outcome, iterations = program.solve(tolerance=tolerance, max_iterations=max_iterations, extra=HANDOVER)
+    moved, left = float(np.abs(final - q).max()), residuals(program.drake, outcome.result)
+    return Confirmation(final, outcome.converged, outcome.status, iterations, outcome.wall_time, moved, *left)

@@ -12,41 +12,47 @@ from pydrake.autodiffutils import AutoDiffXd, ExtractValue, InitializeAutoDiff
 from pipeline.common.arrays import Array
 
 
-class DifferentiableCost:
+class _Remembering:
+    """The last point of a function and its derivatives: IPOPT asks for the value and then for the derivatives there."""
+
+    def __init__(self, function: Callable[[Array], tuple[Any, Array]]) -> None:
+        self._function = function
+        self._x: Array | None = None
+        self._last: tuple[Any, Array] | None = None
+
+    def at(self, x: NDArray[Any]) -> tuple[Any, Array]:
+        """The value and its derivatives."""
+        point = ExtractValue(x).ravel() if x.dtype == object else x
+        if self._last is None or self._x is None or not np.array_equal(self._x, point):
+            self._x, self._last = point.copy(), self._function(point)
+        return self._last
+
+    def forget(self) -> None:
+        """Drop the remembered point: the function has changed."""
+        self._x = self._last = None
+
+
+class DifferentiableCost(_Remembering):
     """A Drake cost from value_and_gradient(x) -> (float, (len(x),)).
 
     Drake's IPOPT interface seeds every binding with the identity, so the gradient by x is the gradient by the seeds.
     """
 
-    def __init__(self, value_and_gradient: Callable[[Array], tuple[float, Array]]) -> None:
-        self.value_and_gradient = value_and_gradient
-
     def __call__(self, x: NDArray[Any]) -> Any:
-        if x.dtype != object:
-            return self.value_and_gradient(x)[0]
-        value, gradient = self.value_and_gradient(ExtractValue(x).ravel())
-        return AutoDiffXd(value, gradient)
+        value, gradient = self.at(x)
+        return AutoDiffXd(value, gradient) if x.dtype == object else value
 
 
-class DifferentiableConstraint:
-    """A Drake constraint from value_and_jacobian(x) -> ((rows,), (rows, len(x))); the last point is remembered.
-
-    IPOPT asks for the value and then for the Jacobian at the same point.
-    """
+class DifferentiableConstraint(_Remembering):
+    """A Drake constraint from value_and_jacobian(x) -> ((rows,), (rows, len(x)))."""
 
     def __init__(self, value_and_jacobian: Callable[[Array], tuple[Array, Array]]) -> None:
-        self.value_and_jacobian = value_and_jacobian
+        super().__init__(value_and_jacobian)
         self.linearisations = 0
-        self._x: Array | None = None
-        self._last: tuple[Array, Array] | None = None
 
     def __call__(self, x: NDArray[Any]) -> Any:
-        differentiate = x.dtype == object
-        point = ExtractValue(x).ravel() if differentiate else x
-        if self._last is None or self._x is None or not np.array_equal(self._x, point):
-            self._x, self._last = point.copy(), self.value_and_jacobian(point)
-        value, jacobian = self._last
-        if not differentiate:
+        value, jacobian = self.at(x)
+        if x.dtype != object:
             return value
         self.linearisations += 1
         return InitializeAutoDiff(value, jacobian).ravel()
@@ -57,6 +63,6 @@ class DifferentiableConstraint:
         return max(0, self.linearisations - 2)
 
     def forget(self) -> None:
-        """Drop the remembered point: the function has changed."""
-        self._x = self._last = None
+        """Also how many iterations there were."""
+        super().forget()
         self.linearisations = 0

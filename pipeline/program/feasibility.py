@@ -14,7 +14,10 @@ from pipeline.problem.costs import integrals, velocities
 from pipeline.problem.problem import Problem
 from pipeline.program.transcription import transcribe
 
-UNITS = {"position": "rad", "velocity": "rad/s", "torque": "N m", "power": "W", "clearance": "m", "attitude": "rad"}
+UNITS = {
+    **{"position": "rad", "velocity": "rad/s", "acceleration": "rad/s^2", "jerk": "rad/s^3"},
+    **{"torque": "N m", "power": "W", "clearance": "m", "attitude": "rad"},
+}
 
 
 @dataclass(frozen=True)

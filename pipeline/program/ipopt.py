@@ -7,7 +7,7 @@ import time
 from dataclasses import dataclass
 from typing import Any
 
-from pydrake.solvers import IpoptSolver, MathematicalProgram, SolverOptions
+from pydrake.solvers import IpoptSolver, MathematicalProgram, MathematicalProgramResult, SolverOptions
 
 from pipeline.common.arrays import Array
 
@@ -21,12 +21,15 @@ CONVERGED = ("success", "stop at acceptable point")
 
 @dataclass(frozen=True)
 class Outcome:
-    """x: the final decision vector. converged: IPOPT's conditions hold, to its tolerance or at worst 1e-6 (status)."""
+    """x: the final decision vector. converged: IPOPT's conditions hold, to its tolerance or at worst 1e-6 (status).
+    result: Drake's, with the multipliers.
+    """
 
     x: Array
     converged: bool
     status: str
     wall_time: float
+    result: MathematicalProgramResult
 
 
 def solve(
@@ -71,4 +74,4 @@ def solve(
     x = result.GetSolution(program.decision_variables())
     status = details.ConvertStatusToString().lower()
     status = STOPPED if "time exceeded" in status else status
-    return Outcome(x, status in CONVERGED, status, wall_time)
+    return Outcome(x, status in CONVERGED, status, wall_time, result)

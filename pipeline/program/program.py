@@ -6,7 +6,7 @@ It knows none of its terms (`terms/`); `transcription.py` puts them together and
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import scipy.sparse as sp
@@ -18,7 +18,7 @@ from pipeline.problem.lagrangian import Lagrangian
 from pipeline.problem.problem import Boundary, Problem
 from pipeline.program import ipopt
 from pipeline.program.differentiable import DifferentiableConstraint
-from pipeline.program.scaling import POSITION_SCALE, Guess, lifted, scale
+from pipeline.program.scaling import POSITION_SCALE, Guess, Scaling, Sums, lifted, scale
 
 KNOTS_PER_BINDING = 10  # a Python binding pays for its size squared: more, smaller bindings are cheaper up to a point
 
@@ -29,12 +29,27 @@ Block = NDArray[np.int_]
 Rate = Callable[[Array, Array], tuple[Array, Array, Array]]  # of an integral, with its derivatives by q and qd
 
 
-class Program:
-    """The unknowns y (N + 1, n) and w (N, n) of a motion on the knots `times`, and room for what terms add.
+class Positions(Protocol):
+    """A motion of which nothing but its positions is asked."""
+
+    @property
+    def q(self) -> Array:
+        """(N + 1, n) [rad]."""
+
+
+class Lifted:
+    """The unknowns of a motion on the knots `times`, of them y (N + 1, n), its positions, and room for what terms add.
 
     A term takes the unknowns of another by name: `forces` (N, forces), `entry` (1, n), `excess` (1,). `drake` is the
     MathematicalProgram; every unknown's start is its initial guess.
     """
+
+    scaling: Scaling
+    guess: Positions
+    stations: NDArray[Any]  # (S, n) unknowns: the positions at which the energy is summed up
+    w: NDArray[Any]  # (S, n) the velocities there, scaled
+    weights: Array  # (S,) [s] of that sum
+    left_out: tuple[int, ...] = ()  # knots at which the path is not asked for
 
     def __init__(
         self, problem: Problem, times: Array, guess: Array, *, elastic: Collection[str] = (), keep_off: float = 0.0
@@ -48,13 +63,10 @@ class Program:
         self.x_ref = problem.reference.position(times)
         self.lagrangian = Lagrangian(problem.task, problem.objective)
         self.forces = lifted(problem)
-        self.guess = Guess.of(problem, times, guess)
-        self.scaling = scale(problem, times, self.guess, self.forces)
         self.drake = MathematicalProgram()
         self._unknowns: dict[str, NDArray[Any]] = {}
         self._rows: list[DifferentiableConstraint] = []
         self.y = self.new("y", POSITION_SCALE * guess)
-        self.w = self.new("w", self.scaling.to_w(self.guess.qd[1:]))
 
     def new(self, name: str, start: Array) -> NDArray[Any]:
         """Unknowns of the shape of their `start`, for all terms to find by `name`."""
@@ -91,14 +103,39 @@ class Program:
         everything = np.concatenate([unknowns, self["excess"]])
         self.drake.AddConstraint(LinearConstraint(both[used], free, above[used]), everything)
 
-    def solve(self, **options: Any) -> tuple[Array, ipopt.Outcome, int]:
-        """Solve from the guess: positions (N + 1, n) [rad], IPOPT's outcome, its iterations."""
+    def run(self, **options: Any) -> tuple[ipopt.Outcome, int]:
+        """Solve from the guess: IPOPT's outcome and its iterations."""
         for rows in self._rows:
             rows.forget()
         outcome = ipopt.solve(self.drake, self.drake.initial_guess(), **options)
-        y = outcome.x[self.drake.FindDecisionVariableIndices(self.y.ravel())]
         # IPOPT linearises every row once per iteration: any of them can tell how many there were.
-        return y.reshape(self.y.shape) / POSITION_SCALE, outcome, self._rows[0].iterations
+        return outcome, self._rows[0].iterations
+
+    def read(self, outcome: ipopt.Outcome, unknowns: NDArray[Any]) -> Array:
+        """The values of unknowns in an outcome, in their shape."""
+        found: Array = outcome.x[self.drake.FindDecisionVariableIndices(unknowns.ravel())]
+        return found.reshape(unknowns.shape)
+
+
+class Program(Lifted):
+    """The same by backward differences: one velocity w (N, n) for each interval, at the end of which energy counts."""
+
+    guess: Guess
+
+    def __init__(
+        self, problem: Problem, times: Array, guess: Array, *, elastic: Collection[str] = (), keep_off: float = 0.0
+    ) -> None:
+        super().__init__(problem, times, guess, elastic=elastic, keep_off=keep_off)
+        self.guess = Guess.of(problem, times, guess)
+        sums = Sums(guess[1:], self.dt, self.guess.costs.tau[1:], self.dt)
+        self.scaling = scale(problem, sums, self.guess.costs, self.forces)
+        self.w = self.new("w", self.scaling.to_w(self.guess.qd[1:]))
+        self.stations, self.weights = self.y[1:], self.dt
+
+    def solve(self, **options: Any) -> tuple[Array, ipopt.Outcome, int]:
+        """Solve from the guess: positions (N + 1, n) [rad], IPOPT's outcome, its iterations."""
+        outcome, iterations = self.run(**options)
+        return self.read(outcome, self.y) / POSITION_SCALE, outcome, iterations
 
 
 def blocks(first: int, end: int) -> list[Block]:

@@ -73,6 +73,18 @@ class Guess:
 
 
 @dataclass(frozen=True)
+class Sums:
+    """Where integrals are summed up: positions q (S, n) and weights (S,) [s] of the energy, forces tau (K, n) and
+    weights (K,) [s] of their squares.
+    """
+
+    q: Array
+    weights: Array
+    tau: Array
+    force_weights: Array
+
+
+@dataclass(frozen=True)
 class Scaling:
     """to_velocity (N, n, n): qd_i = to_velocity_i w_i; force (N, forces): u_i = force_i tau_i.
 
@@ -89,50 +101,50 @@ class Scaling:
         return np.linalg.solve(self.to_velocity, qd[:, :, None])[:, :, 0]
 
 
-def scale(problem: Problem, times: Array, guess: Guess, forces: Forces) -> Scaling:
+def scale(problem: Problem, sums: Sums, costs: Costs, forces: Forces) -> Scaling:
     """Choose S_i and s_i from the guess, so that the objective there is 1."""
-    dt, costs, objective = np.diff(times), guess.costs, problem.objective
+    objective = problem.objective
     # A guess without any base rotation has a cost near zero; its size is then seen from the joints' motion.
     least = NEGLIGIBLE * objective.weight("base_rotation") * costs.integrals["velocity_norm"]
     cost = max(costs.value(objective), least) or 1.0
-    to_velocity = _energy_units(problem, dt, guess, cost)
+    to_velocity = _energy_units(problem, sums, costs, cost)
     diagonal = to_velocity is None
     if to_velocity is None:
-        to_velocity = np.tile(np.eye(problem.task.arm.n) / VELOCITY_SCALE, (len(dt), 1, 1))
-    return Scaling(cost, to_velocity, diagonal, _force_units(problem, dt, guess, forces, cost))
+        to_velocity = np.tile(np.eye(problem.task.arm.n) / VELOCITY_SCALE, (len(sums.weights), 1, 1))
+    return Scaling(cost, to_velocity, diagonal, _force_units(problem, sums, costs, forces, cost))
 
 
-def _energy_units(problem: Problem, dt: Array, guess: Guess, cost: float) -> Array | None:
-    """The inverse S_i (N, n, n), by which the energy is half |w|^2; None where no velocity counts."""
-    arm, lagrangian, q = problem.task.arm, Lagrangian(problem.task, problem.objective), guess.q
+def _energy_units(problem: Problem, sums: Sums, costs: Costs, cost: float) -> Array | None:
+    """The inverse S_i (S, n, n), by which the energy is half |w|^2; None where no velocity counts."""
+    arm, lagrangian, q = problem.task.arm, Lagrangian(problem.task, problem.objective), sums.q
     if not (lagrangian.is_quadratic or of_order(problem.bounds_of_integrals, 1)):
         return None
-    nb, energy = arm.base.count, guess.costs.integrals["kinetic_energy"]
+    nb, energy = arm.base.count, costs.integrals["kinetic_energy"]
     energy = energy if energy > 0 else 1.0
     # Half |w|^2 is the energy's share of the cost, or its ratio to the guess's where it is only bounded.
     share = 1 / cost if lagrangian.is_quadratic else 1 / energy
-    metric = lagrangian.metric(q[1:]) if lagrangian.is_quadratic else arm.mass_matrix(q[1:])
+    metric = lagrangian.metric(q) if lagrangian.is_quadratic else arm.mass_matrix(q)
     if arm.base.kind == "held":
         # Coordinates that are held need no metric, and a base without mass has none.
         metric[:, :nb], metric[:, :, :nb] = 0.0, 0.0
         metric[:, range(nb), range(nb)] = 1.0
     elif nb and lagrangian.inertia == 0:
         # Not all velocities count: a share of the energy makes it regular.
-        metric = metric + SHARE * cost / energy * arm.mass_matrix(q[1:])
+        metric = metric + SHARE * cost / energy * arm.mass_matrix(q)
     root = np.linalg.cholesky(metric)
-    factor = 1 / np.sqrt(share * dt)[:, None, None]
+    factor = 1 / np.sqrt(share * sums.weights)[:, None, None]
     return factor * np.linalg.inv(root).transpose(0, 2, 1)
 
 
-def _force_units(problem: Problem, dt: Array, guess: Guess, forces: Forces, cost: float) -> Array:
-    """s_i (N, forces): a penalised force's squares add up to its share of the cost, a bounded one's to 1."""
-    costs, tau = guess.costs, guess.costs.tau[1:, forces.rows]
+def _force_units(problem: Problem, sums: Sums, costs: Costs, forces: Forces, cost: float) -> Array:
+    """s_i (K, forces): a penalised force's squares add up to its share of the cost, a bounded one's to 1."""
+    tau, own = sums.tau[:, forces.rows], sums.force_weights
     size = float(np.sqrt(np.mean(tau**2))) if forces else 1.0
-    units = np.full(tau.shape, 0.1 / ((size or 1.0) * np.sqrt(len(dt))))
+    units = np.full(tau.shape, 0.1 / ((size or 1.0) * np.sqrt(len(own))))
     for column, (kind, weight) in enumerate(zip(forces.kinds, forces.weights, strict=True)):
         total = costs.integrals[kind]
         if weight > 0:
-            units[:, column] = np.sqrt(weight * dt / cost)
+            units[:, column] = np.sqrt(weight * own / cost)
         elif kind in problem.bounds_of_integrals:
-            units[:, column] = np.sqrt(dt / (total if total > 0 else 1.0))
+            units[:, column] = np.sqrt(own / (total if total > 0 else 1.0))
     return units

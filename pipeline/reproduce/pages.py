@@ -18,14 +18,11 @@ from pipeline.reproduce.drawings import DRAW
 from pipeline.reproduce.recompute import Runs
 from pipeline.reproduce.results import ResultError
 from pipeline.reproduce.table import counts
-from pipeline.reproduce.tables import HEAD, cells, sentence
+from pipeline.reproduce.tables import HEAD, TIMES, cells, sentence
+from pipeline.reproduce.verdict import TIMING
 
 DPI = 90
-
-
 INDEX = "reproduction.html"
-
-
 STYLE = """
 body { font: 15px/1.45 system-ui, sans-serif; color: #1a202c; max-width: 1150px; margin: 2rem auto; padding: 0 1rem }
 h1 { font-size: 1.5rem } h2 { font-size: 1.15rem; margin-top: 2.2rem; border-bottom: 1px solid #d5d9df }
@@ -37,7 +34,7 @@ td.note { color: #5a6472 } code { font-size: .85em }
 img { max-width: 100%; display: block; margin: .8rem 0 }
 .verdict { border-radius: .6rem; padding: .05rem .55rem; white-space: nowrap }
 .reproduced { background: #d8f0df } .better { background: #d7e7fa } .misprint { background: #fbeecb }
-.differs { background: #fadbd8 }
+.differs { background: #fadbd8 } .timing { background: #edf2f7 }
 """
 
 
@@ -59,10 +56,16 @@ def index(documents: Sequence[Document], table: pd.DataFrame) -> str:
     for document in documents:
         own = table[table["document"] == document.name]
         link = f'<a href="{document.name}.html">{escape(document.title)}</a><br>{escape(document.source)}'
-        rows.append([link, *map(str, counts(own).values()), str(len(own))])
-    rows.append(["all", *map(str, counts(table).values()), str(len(table))])
+        rows.append([link, *map(str, counts(own).values()), str(sum(counts(own).values()))])
+    rows.append(["all", *map(str, counts(table).values()), str(sum(counts(table).values()))])
     body = f"<h1>Printed and recomputed</h1><p>{escape(sentence(table))}.</p>{_table(head, rows)}"
-    for verdict, title in (("differs", "What differs, and why"), ("misprint", "Misprints"), ("better", "Better")):
+    kinds = (
+        ("differs", "What differs, and why"),
+        ("misprint", "Misprints"),
+        ("better", "Better"),
+        (TIMING, TIMES),
+    )
+    for verdict, title in kinds:
         own = table[table["verdict"] == verdict]
         if len(own):
             body += f"<h2>{title}</h2>{_numbers(own, with_document=True)}"

@@ -10,7 +10,7 @@ import pandas as pd
 from pipeline.config.documents import Document, Row
 from pipeline.reproduce.recompute import Runs, recompute
 from pipeline.reproduce.results import ResultError
-from pipeline.reproduce.verdict import VERDICTS, verdict
+from pipeline.reproduce.verdict import TIMING, VERDICTS, verdict
 
 COLUMNS = (
     "document",
@@ -28,7 +28,9 @@ COLUMNS = (
 
 
 def judge(row: Row, value: float) -> str:
-    """The verdict on one row whose recomputed value is known."""
+    """The verdict on one row whose recomputed value is known; a computing time gets none."""
+    if row.found.timing and np.isfinite(value):
+        return TIMING
     between = None if row.between is None else (row.between[0], row.between[1])
     return verdict(row.printed, value, reading=row.reading, tolerance=row.tolerance, between=between, better=row.better)
 
@@ -69,7 +71,7 @@ def compare(documents: Sequence[Document], runs: Runs) -> pd.DataFrame:
 
 
 def counts(table: pd.DataFrame) -> dict[str, int]:
-    """How many rows have each verdict."""
+    """How many rows have each verdict; computing times have none."""
     return {name: int((table["verdict"] == name).sum()) for name in VERDICTS}
 
 

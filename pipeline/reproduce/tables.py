@@ -12,7 +12,9 @@ from pipeline.common.files import write_beside
 from pipeline.common.markdown import markdown_table
 from pipeline.config.documents import Document
 from pipeline.reproduce.table import counts
+from pipeline.reproduce.verdict import TIMING
 
+TIMES = "Computing times, those of the document from its own machine"
 HEAD = ("place", "quantity", "printed", "recomputed", "difference", "verdict", "with printed masses", "note")
 
 
@@ -24,18 +26,23 @@ def write(folder: Path, documents: Sequence[Document], table: pd.DataFrame) -> N
 
 
 def markdown(documents: Sequence[Document], table: pd.DataFrame) -> str:
-    """A table per document, with the count of verdicts above it."""
+    """A table per document, with the count of verdicts above it, and one of its computing times."""
     lines = ["# Printed and recomputed", "", sentence(table) + ".", ""]
     for document in documents:
         own = table[table["document"] == document.name]
-        rows = [list(HEAD), *(cells(row) for row in own.to_dict("records"))]
-        lines += [f"## {document.title}", "", f"{document.source}. {sentence(own)}.", "", *markdown_table(rows), ""]
+        lines += [f"## {document.title}", "", f"{document.source}. {sentence(own)}.", ""]
+        for title, part in (("", own[own["verdict"] != TIMING]), (TIMES, own[own["verdict"] == TIMING])):
+            if len(part):
+                rows = [list(HEAD), *(cells(row) for row in part.to_dict("records"))]
+                lines += [*([f"### {title}", ""] if title else []), *markdown_table(rows), ""]
     return "\n".join(lines)
 
 
 def sentence(table: pd.DataFrame) -> str:
-    """How many of each verdict, in words."""
-    return f"{len(table)} printed numbers: " + ", ".join(f"{count} {name}" for name, count in counts(table).items())
+    """How many of each verdict, in words, and how many computing times stand beside."""
+    judged, timings = counts(table), int((table["verdict"] == TIMING).sum())
+    said = f"{sum(judged.values())} printed numbers: " + ", ".join(f"{count} {name}" for name, count in judged.items())
+    return said + f"; {timings} computing times, which are not judged" * (timings > 0)
 
 
 def cells(row: dict[Any, Any]) -> list[str]:

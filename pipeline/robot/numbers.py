@@ -13,6 +13,7 @@ from pipeline.common.errors import RobotError
 
 Vector = tuple[float, ...]
 
+LARGEST = 1e20  # of a number that is not a limit: squares and products of larger ones leave what a computer counts
 SPACE = " \t\r\n"  # XML's own: no other white space separates numbers
 WORDS = ("none", "a number", *(f"{word} numbers" for word in ("two", "three", "four", "five", "six", "seven")))
 
@@ -27,6 +28,8 @@ def number(text: str, where: str, *, infinite: bool = False) -> float:
     value = float(word) if read else np.nan
     if not (np.isfinite(value) or (infinite and np.isinf(value))):
         raise RobotError(f"{where} '{shown(text)}', expected a number")
+    if abs(value) > LARGEST and not infinite:
+        raise RobotError(f"{where} '{shown(text)}', expected a number of at most {LARGEST:g} in size")
     return value
 
 

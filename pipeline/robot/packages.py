@@ -113,13 +113,13 @@ def _listed(*variables: str) -> list[str]:
     return [root for variable in variables for root in os.environ.get(variable, "").split(os.pathsep) if root]
 
 
-def find(name: str) -> Path:
-    """A robot description by package://, model:// or file:// name, or by a path.
+def find(name: str, key: str = "robot.urdf") -> Path:
+    """The file that `key` names: by package://, model:// or file:// name, or by a path.
 
     A path may be relative to the working directory or to the project.
     """
     if name.startswith(SCHEMES):
-        return model_file(name) or locate(name, "robot.urdf")
+        return model_file(name) or locate(name, key)
     given = Path(unquote(urlsplit(name).path)) if name.startswith("file:") else Path(name).expanduser()
     if not given.is_absolute() and not given.is_file() and (ours := shipped(name)).is_file():
         return ours

@@ -74,4 +74,6 @@ class Console:
         for row in summary.to_dict("records"):
             if row["message"]:
                 self.console.print(f"{row['method']}: {row['message']}", soft_wrap=True)
+            if row["evidence"] and row["optimum"] == 1:
+                self.console.print(f"{row['method']}: {row['evidence']}", soft_wrap=True)
         self.console.print(f"results in {folder}", soft_wrap=True)

@@ -61,9 +61,9 @@ def told(error: BaseException) -> tuple[str, int]:
     return f"{type(error).__name__}: {_joined(error)}", 1
 
 
-def foreseen(error: BaseException) -> bool:
-    """Whether the line says it all; any other error is a bug of ours, whose traceback is worth keeping."""
-    return told(error)[1] != 1 or isinstance(error, MemoryError)
+def foreseen(error: BaseException, code: int) -> bool:
+    """Whether the line told with this code says it all; other errors are bugs of ours: their traceback is kept."""
+    return code != 1 or isinstance(error, MemoryError)
 
 
 def where(error: BaseException) -> str:

@@ -56,7 +56,7 @@ def job(values: DictConfig) -> int:
         if leaves(error):
             raise
         line, code = told(error)
-        if not foreseen(error):
+        if not foreseen(error, code):
             sweep.write_traceback(folder, error)
             line += " (see error.txt)"
         print(f"error: {f'{folder.name}: ' if sweeping and code != 2 else ''}{line}", file=sys.stderr)
@@ -102,7 +102,7 @@ def run_job(
         if isinstance(error, SystemExit) and not isinstance(error.code, str):
             raise  # somebody has said why
         line, code = told(error)
-        return _complain(line if foreseen(error) else f"{line} ({where(error)})", code)
+        return _complain(line if foreseen(error, code) else f"{line} ({where(error)})", code)
     finally:
         ownership.release()
     return session.exit_code

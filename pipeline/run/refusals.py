@@ -74,6 +74,10 @@ def in_one_line(error: Exception) -> str:
     unknown = re.search(UNKNOWN, str(error))
     if unknown:
         key = unknown.group(1)
+        inner = re.search(r"is not in struct\s+full_key: (\S+)", str(error.__cause__))
+        if inner and inner.group(1).startswith(f"{key}."):  # of a table that was given whole
+            key, beside = inner.group(1), _keys_beside(inner.group(1))
+            return unknown_key(key, beside) if beside else f"{key}: entries are added with a plus, as +{key}=..."
         return _without_its_plus(key) or unknown_key(key, _keys_beside(key))
     return " ".join(line.strip() for line in message.splitlines() if line.strip() and not line.startswith("See http"))
 

@@ -13,16 +13,23 @@ from pipeline.common.versions import DECISIVE, versions
 from pipeline.config.documents import FOLDER
 from pipeline.config.path import WaypointsConfig
 from pipeline.config.run import RunConfig
+from pipeline.robot import formats
 from pipeline.robot.packages import find
 
 WITHOUT_EFFECT = ("parallel", "sweep")  # groups that change no result
 
 
 def inputs(config: RunConfig) -> dict[str, str]:
-    """Digests of the files that the configuration names: they can change while their names do not."""
-    files = {"robot.urdf": find(config.robot.urdf)}
+    """Digests of the files that the configuration names, and of those that they include: they can change while their
+    names do not.
+    """
+    robot = find(config.robot.urdf)
+    files = {"robot.urdf": robot}
+    files |= {f"robot.urdf: {name}": file for name, file in formats.files(robot).items() if file != robot}
     if isinstance(config.path, WaypointsConfig):
         files["path.file"] = Path(config.path.file)
+    if config.limits.file is not None:
+        files["limits.file"] = find(config.limits.file, "limits.file")
     if config.identification.run:
         files |= {f"conf/reproduction/{name}.yaml": FOLDER / f"{name}.yaml" for name in config.identification.documents}
     return {key: hashlib.sha256(file.read_bytes()).hexdigest() for key, file in files.items()}

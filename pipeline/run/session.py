@@ -102,7 +102,7 @@ def _refusing() -> Iterator[None]:
         if leaves(error):
             raise
         line, code = told(error)
-        print(f"error: {line if foreseen(error) else f'{line} ({where(error)})'}", file=sys.stderr)
+        print(f"error: {line if foreseen(error, code) else f'{line} ({where(error)})'}", file=sys.stderr)
         raise SystemExit(code) from None
 
 

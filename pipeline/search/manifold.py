@@ -9,7 +9,8 @@ from pipeline.model.clearance import Clearance
 from pipeline.model.kernel.chain import Chain
 from pipeline.model.kernel.energy import energy, mass_matrix
 from pipeline.model.kernel.rows import TaskRows
-from pipeline.problem.problem import Problem
+from pipeline.problem.problem import Boundary, Problem
+from pipeline.problem.turns import endless, full_turns
 
 BLOCK = 512  # configurations per call of the kernel: more leave the processor's cache
 ARRIVED = 1e-8  # [m, rad]
@@ -21,16 +22,18 @@ INSIDE = 1e-9  # [rad]
 
 
 class Manifold:
-    """What a search needs of a problem: projection, limits, metric and cost. The arm's base stands still."""
+    """What a search needs of a problem: projection, limits, metric and cost. The arm's base has no coordinates; one
+    that has is `floating.py`'s.
+    """
 
     def __init__(self, problem: Problem) -> None:
         self.problem, self.chain = problem, Chain.of(problem.task.arm)
         self.rows, self.n = TaskRows(self.chain, problem.task), self.chain.n
         bounds, objective = problem.bounds, problem.objective
         self.lower, self.upper = bounds.lower, bounds.upper
+        self.joints = problem.task.arm.joints
         # Only joints without limits come round again.
-        turning = problem.task.arm.description.revolute & np.isinf(bounds.lower) & np.isinf(bounds.upper)
-        self.period = np.where(turning, 2 * np.pi, 0.0)
+        self.period = np.where(endless(problem), 2 * np.pi, 0.0)
         self.inertia, self.norm = objective.weight("kinetic_energy"), objective.weight("velocity_norm")
         if not self.inertia and not self.norm:
             self.inertia = 1.0
@@ -54,10 +57,13 @@ class Manifold:
         dt = np.diff(times)
         q = motions[:, 1:].reshape(-1, self.n)
         qd = (np.diff(motions, axis=1) / dt[:, None]).reshape(-1, self.n)
+        return np.asarray(self.rate(q, qd).reshape(len(motions), -1) @ dt)
+
+    def rate(self, q: Array, qd: Array) -> Array:
+        """L (K,)."""
         parts = [slice(k, k + BLOCK) for k in range(0, len(q), BLOCK)]
         value = np.concatenate([energy(self.chain, q[k], qd[k], second=False).value for k in parts])
-        value = self.inertia * value + self.norm * (qd * qd).sum(axis=1)
-        return np.asarray(value.reshape(len(motions), -1) @ dt)
+        return np.asarray(self.inertia * value + self.norm * (qd[:, self.joints] ** 2).sum(axis=1))
 
     def allowed(self, q: Array) -> Array:
         """(K,): within position limits, and clear of obstacles and of the arm itself."""
@@ -89,22 +95,51 @@ class Manifold:
             damping = (1e-12 + DAMPING * squared) * np.trace(inner, axis1=1, axis2=2) + 1e-300
             inner[:, range(m), range(m)] += damping[:, None]
             move = -(right @ np.linalg.solve(inner, error[:, :, None]))[:, :, 0]
-            q[rows] += move * np.minimum(1.0, LONGEST / np.maximum(np.linalg.norm(move, axis=1, keepdims=True), 1e-300))
+            short = np.minimum(1.0, LONGEST / np.maximum(np.linalg.norm(move, axis=1, keepdims=True), 1e-300))
+            q[rows] = self.moved(q[rows], move * short)
         return q, arrived
+
+    def moved(self, q: Array, move: Array) -> Array:
+        """q (K, n) after a move of the joints (K, joints)."""
+        return q + move
+
+    def wait(self, q: Array, dt: float) -> Array:
+        """q (K, n) after dt [s], later or earlier, in which no joint moves."""
+        return q
+
+    def along(self, grid: Array, wished: Array) -> tuple[Array, Array]:
+        """Motions (P, N + 1, n) like the `wished` ones, on the path at the knots `grid`; and whether they are (P,)."""
+        count, q = len(wished), wished.reshape(-1, self.n)
+        target = np.tile(self.problem.reference.position(grid), (count, 1))
+        flat, arrived = self.project(q, target, steps=12, tolerance=1e-7)
+        motions = flat.reshape(wished.shape)
+        if self.problem.boundary is Boundary.FIXED:
+            motions[:, 0] = self.problem.q_init
+        if self.problem.boundary is Boundary.CYCLIC:
+            motions[:, -1] = motions[:, 0] + full_turns(self.problem, motions[:, 0], motions[:, -1])
+        return motions, np.asarray(arrived.reshape(count, -1)[:, 1:].all(axis=1))
 
     def draw(self, target: Array, count: int, rng: np.random.Generator) -> Array:
         """At most `count` allowed configurations (K, n) at one target (m,): uniform joint angles, projected."""
-        low = np.where(np.isfinite(self.lower), self.lower, -np.pi)
-        high = np.where(np.isfinite(self.upper), self.upper, np.pi)
         kept = np.empty((0, self.n))
         for _ in range(TRIES):
             lacking = max(8, int(DRAWN * (count - len(kept))))
-            q, arrived = self.project(rng.uniform(low, high, (lacking, self.n)), np.tile(target, (lacking, 1)))
+            q, arrived = self.project(self.uniform(lacking, rng), np.tile(target, (lacking, 1)))
             q = self.home(q[arrived])
             kept = np.concatenate([kept, q[self.allowed(q)]])
             if len(kept) >= count:
                 break
         return kept[:count]
+
+    def first(self, target: Array, count: int, rng: np.random.Generator) -> Array:
+        """The same, where a motion begins."""
+        return self.draw(target, count, rng)
+
+    def uniform(self, count: int, rng: np.random.Generator) -> Array:
+        """Uniform coordinates (count, n) within their limits, half a turn to both sides where there are none."""
+        low = np.where(np.isfinite(self.lower), self.lower, -np.pi)
+        high = np.where(np.isfinite(self.upper), self.upper, np.pi)
+        return rng.uniform(low, high, (count, self.n))
 
     def _error_and_jacobian(self, q: Array, target: Array) -> tuple[Array, Array]:
         parts = [slice(k, k + BLOCK) for k in range(0, max(1, len(q)), BLOCK)]

@@ -24,16 +24,18 @@ def random_inverse_weights(rng: np.random.Generator, count: int, n: int) -> Arra
     return np.asarray(np.einsum("kij,kj,klj->kil", basis, 1.0 / np.maximum(eigenvalues, 1e-3), basis))
 
 
-def population(problem: Problem, times: Array, starts: Array, count: int, rng: np.random.Generator) -> Array:
+def population(
+    problem: Problem, times: Array, starts: Array, count: int, rng: np.random.Generator, *, plain: bool = True
+) -> Array:
     """Motions (K, N + 1, n) that stay on the path at every knot; K <= count: those that lose it are left out.
 
     They are spread evenly over the initial configurations `starts` (C, n); of each, the first is the inertia-weighted
-    and the second the plain pseudoinverse, the others have random constant weights.
+    and the second the plain pseudoinverse (unless `plain` is False), the others have random constant weights.
     """
     arm = problem.task.arm
     x_ref = problem.reference.position(times)
     which = np.arange(count) % len(starts)
-    turn = np.arange(count) // len(starts)
+    turn = np.arange(count) // len(starts) + (0 if plain else 2)
     joints = arm.n - arm.base.count
     constant = random_inverse_weights(rng, count, joints)
     constant[turn == 1] = np.eye(joints)

@@ -3,18 +3,20 @@
 Half of each layer's nodes are uniform joint angles put onto the manifold, which reach every branch; the other half are
 carried along the whole path from some layers by inertia-weighted steps, which stay on a branch. An edge costs
 1/2 d'G d/dt with the objective's metric G at both ends. The cheapest path through every node is a start; cheap ones
-that are far apart are priced on the first grid, and of those again the cheap ones that are far apart remain.
+that are far apart are priced on the first grid, and of those again the cheap ones that are far apart remain. Further
+starts are the cheapest paths through a few random nodes of each layer: no two draws are alike, and none is far dearer
+than it must be.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline.common.arrays import Array
 from pipeline.problem.problem import Boundary, Problem
 from pipeline.problem.turns import full_turns
+from pipeline.search.floating import OnMovingBase
 from pipeline.search.layers import Edges, closed_paths, through_every_node
 from pipeline.search.manifold import Manifold
 from pipeline.search.selection import diverse
@@ -23,52 +25,107 @@ SLACK = 1.15  # times the velocity limits: a coarse step's mean may be a little 
 PRICED = 3  # times as many starts are priced on the first grid as are kept
 APART = 0.1  # [rad]: starts are not closer than half of this
 CLOSED = 1e-6  # [rad]
+FEW = 4  # nodes of a layer, at most, that a random motion may choose from: with 8 the cheap ones prevail
 
 
-@dataclass(frozen=True)
 class Roadmap:
-    """Sizes: nodes per layer, layers after the first, motions that are returned at most."""
+    """The graph of one problem, with `nodes` in each of the layers 1 .. `layers`, and its paths as motions on `grid`.
 
-    nodes: int = 300
-    layers: int = 6
-    most: int = 64
+    All motions (P, N + 1, n) are on the path at every knot; P may be 0.
+    """
 
-    def starts(self, problem: Problem, grid: Array, rng: np.random.Generator) -> Array:
-        """Motions (P, N + 1, n) on the knots `grid`, on the path at every knot, cheapest first; P may be 0."""
-        manifold = Manifold(problem)
-        none = np.empty((0, len(grid), manifold.n))
-        times = np.interp(np.linspace(0, len(grid) - 1, self.layers + 1), np.arange(len(grid)), grid)
-        nodes = _Sampler(manifold, times, self.nodes, rng).layers()
-        if min(map(len, nodes)) == 0:
-            return none
-        closed = problem.boundary is Boundary.CYCLIC
-        cheapest = closed_paths if closed else through_every_node
-        paths, costs = cheapest(edge_costs(manifold, times, nodes, problem.bounds.velocity))
+    def __init__(
+        self, problem: Problem, grid: Array, rng: np.random.Generator, *, nodes: int = 300, layers: int = 6
+    ) -> None:
+        self.problem, self.grid, self.rng = problem, grid, rng
+        self.manifold = OnMovingBase(problem) if problem.task.arm.base.count else Manifold(problem)
+        self.closed = problem.boundary is Boundary.CYCLIC
+        self.times = np.interp(np.linspace(0, len(grid) - 1, layers + 1), np.arange(len(grid)), grid)
+        self.nodes = _Sampler(self.manifold, self.times, nodes, rng).layers()
+        self._more = 1  # times as many nodes of each layer as `random` would need without velocity limits
+        self.edges: Edges = []
+        if min(map(len, self.nodes)):
+            self.edges = self._costs(problem.bounds.velocity[self.manifold.joints])
+
+    def cheapest(self, most: int) -> Array:
+        """At most `most` of the cheapest motions through every node, cheap and spread out."""
+        if not self.edges:
+            return self._none
+        paths, costs = self._paths(self.edges)
         if not len(paths):  # too fast everywhere: what is nearest to the limits is for the solver to find
-            paths, costs = cheapest(edge_costs(manifold, times, nodes, np.full(manifold.n, np.inf)))
-        coarse = np.stack([layer[column] for layer, column in zip(nodes, paths.T, strict=True)], axis=1)
-        turns = np.cumsum(manifold.wrap(np.diff(coarse, axis=1)), axis=1)
-        coarse[:, 1:] = coarse[:, :1] + turns
-        if closed:  # up to whole turns of those joints alone that nothing limits
-            gap = coarse[:, -1] - coarse[:, 0]
-            back = np.abs(gap - full_turns(problem, coarse[:, 0], coarse[:, -1])).max(axis=1) < CLOSED
-            coarse, costs = coarse[back], costs[back]
+            self.edges = self._costs(np.full_like(self.problem.bounds.velocity[self.manifold.joints], np.inf))
+            paths, costs = self._paths(self.edges)
+        coarse, costs = self._unwound(paths, costs)
         if not len(coarse):
-            return none
-        revolute = problem.task.arm.description.revolute
-        motions = _on_grid(manifold, times, coarse[diverse(coarse, costs, PRICED * self.most, APART, revolute)], grid)
+            return self._none
+        revolute = self.problem.task.arm.description.revolute
+        motions = self._on_grid(coarse[diverse(coarse, costs, PRICED * most, APART, revolute)])
         if not len(motions):
-            return none
-        chosen = diverse(motions, manifold.cost(grid, motions), self.most, APART, revolute)
-        return motions[chosen]
+            return motions
+        return motions[diverse(motions, self.manifold.cost(self.grid, motions), most, APART, revolute)]
+
+    def random(self, count: int) -> Array:
+        """About `count` motions through few random nodes of each layer: dearer ones, that end in other optima."""
+        found: list[Array] = []
+        for _ in range(count):
+            if not self.edges or sum(map(len, found)) >= count:
+                break
+            size = self._more * int(self.rng.integers(2, FEW + 1))
+            few = [np.sort(self.rng.choice(len(layer), min(size, len(layer)), replace=False)) for layer in self.nodes]
+            if self.closed:
+                few[-1] = few[0]
+            paths, _ = self._paths([edge[np.ix_(*ends)] for edge, *ends in zip(self.edges, few, few[1:], strict=False)])
+            if not len(paths):  # too fast, all of them
+                self._more *= 2
+                continue
+            some = paths[self.rng.permutation(len(paths))[:FEW]]
+            found.append(np.stack([nodes[column] for nodes, column in zip(few, some.T, strict=True)], axis=1))
+        if not found:
+            return self._none
+        coarse, _ = self._unwound(np.concatenate(found), np.zeros(sum(map(len, found))))
+        return self._on_grid(coarse)[:count]
+
+    @property
+    def _none(self) -> Array:
+        return np.empty((0, len(self.grid), self.manifold.n))
+
+    def _costs(self, velocity: Array) -> Edges:
+        return edge_costs(self.manifold, self.times, self.nodes, velocity)
+
+    def _paths(self, edges: Edges) -> tuple[NDArray[np.int_], Array]:
+        return closed_paths(edges) if self.closed else through_every_node(edges)
+
+    def _unwound(self, paths: NDArray[np.int_], costs: Array) -> tuple[Array, Array]:
+        """The nodes (P, L + 1, n) of paths, every joint going the shorter way; without those that do not close."""
+        coarse = np.stack([layer[column] for layer, column in zip(self.nodes, paths.T, strict=True)], axis=1)
+        coarse[:, 1:] = coarse[:, :1] + np.cumsum(self.manifold.wrap(np.diff(coarse, axis=1)), axis=1)
+        if self.closed:  # up to whole turns of those joints alone that nothing limits
+            gap = coarse[:, -1] - coarse[:, 0]
+            back = np.abs(gap - full_turns(self.problem, coarse[:, 0], coarse[:, -1])).max(axis=1) < CLOSED
+            coarse, costs = coarse[back], costs[back]
+        return coarse, costs
+
+    def _on_grid(self, coarse: Array) -> Array:
+        """The motions between layers, put onto the path at the knots `grid`; without those that lose it."""
+        manifold, times, grid = self.manifold, self.times, self.grid
+        if not len(coarse):
+            return self._none
+        at = np.clip(np.searchsorted(times, grid, side="right") - 1, 0, len(times) - 2)
+        share = ((grid - times[at]) / (times[at + 1] - times[at]))[:, None]
+        wished = np.clip(coarse[:, at] * (1 - share) + coarse[:, at + 1] * share, manifold.lower, manifold.upper)
+        motions, arrived = manifold.along(grid, wished)
+        return np.asarray(motions[arrived])
 
 
 def edge_costs(manifold: Manifold, times: Array, nodes: list[Array], velocity: Array) -> Edges:
-    """Of every pair of neighbours 1/2 d'G d/dt, G the mean of both ends' metrics; infinite beyond `velocity` (n,)."""
+    """Of every pair of neighbours 1/2 d'G d/dt of the joints, G the mean of both ends' metrics; infinite beyond
+    `velocity` (joints,).
+    """
     roots = [np.linalg.cholesky(manifold.metric(layer)) for layer in nodes]
-    n, edges = manifold.n, []
+    n, edges = len(velocity), []
     for i, dt in enumerate(np.diff(times)):
-        d = manifold.wrap(nodes[i + 1][None] - nodes[i][:, None]).transpose(2, 0, 1).astype(np.float32)
+        d = manifold.wrap(nodes[i + 1][None] - nodes[i][:, None])[..., manifold.joints]
+        d = d.transpose(2, 0, 1).astype(np.float32)
         cost = np.zeros(d.shape[1:], np.float32)
         for column in range(n):  # |L'd|^2 for both ends' roots
             for root, axes in ((roots[i + 1], np.s_[None, :]), (roots[i], np.s_[:, None])):
@@ -93,11 +150,11 @@ class _Sampler:
     def layers(self) -> list[Array]:
         closed = self.manifold.problem.boundary is Boundary.CYCLIC
         for layer in range(0 if self.given is None else 1, self.last if closed else self.last + 1):
-            self.parts[layer].append(self.manifold.draw(self.x[layer], self.count // 2, self.rng))
+            self.parts[layer].append(self._drawn(layer, self.count // 2))
         first = max(1, self.last // 4) if self.given is not None else 0
         bases = sorted({first, self.last // 2, self.last})
         for base in bases:
-            drawn = self.manifold.draw(self.x[base], max(1, self.count // 2 // len(bases)), self.rng)
+            drawn = self._drawn(base, max(1, self.count // 2 // len(bases)))
             self.parts[base].append(drawn)
             self._carry(drawn, base, 1)
             self._carry(drawn, base, -1)
@@ -108,31 +165,24 @@ class _Sampler:
             self.parts[-1] = self.parts[0]
         return [np.concatenate(part) for part in self.parts]
 
+    def _drawn(self, layer: int, count: int) -> Array:
+        draw = self.manifold.draw if layer else self.manifold.first
+        return draw(self.x[layer], count, self.rng)
+
     def _carry(self, q: Array, layer: int, direction: int) -> None:
         """Along the path to its end, as far as the limits allow, in two steps from layer to layer."""
-        end = self.last if direction > 0 else 0 if self.given is None else 1
-        while layer != end and len(q):
+        # Where a motion begins, a base that moves stands where it stands.
+        first = 1 if self.given is not None or self.manifold.problem.task.arm.base.count else 0
+        end = self.last if direction > 0 else first
+        while (end - layer) * direction > 0 and len(q):
             ahead = layer + direction
-            for time in (0.5 * (self.times[layer] + self.times[ahead]), self.times[ahead]):
+            half = 0.5 * (self.times[ahead] - self.times[layer])
+            for time in (self.times[ahead] - half, self.times[ahead]):
                 target = np.tile(self.manifold.problem.reference.position(np.array([time])), (len(q), 1))
                 if len(q):
+                    q = self.manifold.wait(q, half)
                     q, arrived = self.manifold.project(q, target, self.manifold.metric(q), steps=10)
                     q = q[arrived]
                     q = q[self.manifold.allowed(q)]
             layer = ahead
             self.parts[layer].append(self.manifold.home(q))
-
-
-def _on_grid(manifold: Manifold, times: Array, coarse: Array, grid: Array) -> Array:
-    """The motions (P, L + 1, n) between layers, put onto the path at the knots `grid`; without those that lose it."""
-    at = np.clip(np.searchsorted(times, grid, side="right") - 1, 0, len(times) - 2)
-    share = ((grid - times[at]) / (times[at + 1] - times[at]))[:, None]
-    q = np.clip(coarse[:, at] * (1 - share) + coarse[:, at + 1] * share, manifold.lower, manifold.upper)
-    target = np.tile(manifold.problem.reference.position(grid), (len(q), 1))
-    flat, arrived = manifold.project(q.reshape(-1, manifold.n), target, steps=12, tolerance=1e-7)
-    motions = flat.reshape(q.shape)
-    if manifold.problem.boundary is Boundary.FIXED:
-        motions[:, 0] = manifold.problem.q_init
-    if manifold.problem.boundary is Boundary.CYCLIC:
-        motions[:, -1] = motions[:, 0] + full_turns(manifold.problem, motions[:, 0], motions[:, -1])
-    return motions[arrived.reshape(len(q), -1)[:, 1:].all(axis=1)]

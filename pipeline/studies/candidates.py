@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -55,7 +55,9 @@ def study(motions: Motions) -> Candidates | None:
     config, problem, found = motions.config, motions.problem, motions.confirmed("global")
     if not config.candidate_study.run or not found:
         return None
-    optimum = float(objective_values(problem, problem.times, found[0].solution.trajectory.q[None])[0])
+    trajectory = found[0].solution.trajectory
+    problem = replace(problem, times=trajectory.time)
+    optimum = float(objective_values(problem, problem.times, trajectory.q[None])[0])
     return measure(problem, optimum, config.method.global_, config.candidate_study, config.seed)
 
 

@@ -24,10 +24,10 @@ from pydrake.trajectories import PiecewisePolynomial
 
 from pipeline.common.arrays import Array
 from pipeline.config.studies import ClosedLoopConfig
-from pipeline.evaluation.curve import curve
 from pipeline.evaluation.evaluation import Evaluation
 from pipeline.model.arm import Arm
 from pipeline.model.stack import assemble
+from pipeline.problem.curve import curve
 from pipeline.problem.problem import Problem
 from pipeline.studies import style
 from pipeline.studies.export import chosen
@@ -132,7 +132,7 @@ def effort_limits(problem: Problem) -> Array:
 def simulate(problem: Problem, evaluation: Evaluation, options: ClosedLoopConfig) -> ClosedLoop:
     """Follow the motion once. The controller knows the arm exactly but for options.mass_error."""
     arm, n = problem.task.arm, problem.task.arm.n
-    spline = curve(problem, evaluation.time, evaluation.q)
+    spline = curve(problem, evaluation.time, evaluation.q, evaluation.solution.trajectory.ends)
     knots = spline.x
     # A cubic spline is the Hermite interpolant of its own slopes.
     reference = PiecewisePolynomial.CubicHermite(knots, spline(knots).T, spline(knots, 1).T)

@@ -9,14 +9,19 @@ from typing import Any, ClassVar
 import numpy as np
 
 from pipeline.common.arrays import Array
-from pipeline.evaluation.between import audit
-from pipeline.evaluation.curve import curve, whole
+from pipeline.evaluation.between import Audit, audit
 from pipeline.evaluation.evaluation import Evaluation
-from pipeline.evaluation.limits import LIMITS
+from pipeline.problem.curve import curve, end_speeds, whole
 from pipeline.problem.problem import Problem
 from pipeline.studies.study import Motions, Result
 
 TOLERANCE = 1e-6  # relative: of limits that are met
+RESTS = 0.01  # of the largest joint speed: what still counts as rest
+NAMED = 3  # motions whose faults are said
+WAY_OUT = (
+    "boundary.rest=[start,end], for a given start with limits.acceleration, makes the planner find one that can be; "
+    "see the experiments sim4_sendable and panda_sendable"
+)
 BETWEEN = 4  # sub-intervals per knot interval at which the curve is judged, besides its samples
 
 
@@ -25,6 +30,7 @@ class Resampled(Result):
     """Samples at time (K,) [s]: q, qd, qdd (K, n); and what the evaluation's own plant says of their curve.
 
     limit_excess: by kind, relative (see evaluation.limit_excess); worst: where each is largest, (time [s], joint).
+    faults: why it cannot be sent; none if it can.
     """
 
     name: ClassVar[str] = "export"
@@ -39,6 +45,13 @@ class Resampled(Result):
     orientation_error: float
     limit_excess: dict[str, float]
     worst: dict[str, tuple[float, str]]
+    faults: tuple[str, ...] = ()
+
+    @property
+    def fault(self) -> str:
+        """The first of its faults in one sentence."""
+        more = len(self.faults) - NAMED
+        return " and ".join([*self.faults[:NAMED], *([f"has {more} more faults"] if more > 0 else [])])
 
     @property
     def keeps_limits(self) -> bool:
@@ -61,54 +74,74 @@ class Resampled(Result):
             "tracking_error": self.tracking_error,
             "limit_excess": self.limit_excess,
             "keeps_limits": self.keeps_limits,
+            "faults": list(self.faults),
         }
 
 
+@dataclass(frozen=True)
 class Nothing(Result):
-    """No motion is good enough to be sent."""
+    """No motion is good enough to be sent. refused: those that were looked at, the cheapest first."""
 
-    name = "export"
+    name: ClassVar[str] = "export"
+    refused: tuple[Resampled, ...] = ()
 
     def section(self) -> list[str]:
+        if not self.refused:
+            return ["Exported: nothing, since no motion is confirmed."]
+        named = [f"{motion.method} {motion.optimum} {motion.fault}" for motion in self.refused[:NAMED]]
+        more = len(self.refused) - len(named)
+        others = f"; so it is with {more} more" if more else ""
         return [
-            "Exported: nothing, since no confirmed motion keeps every limit and, to path.tolerance between its knots "
-            "too, its path (export.method names one anyway)."
+            f"Exported: nothing, since no confirmed motion can be sent: {'; '.join(named)}{others}. {WAY_OUT}; "
+            "export.force=true writes the cheapest all the same."
         ]
+
+    def facts(self) -> Mapping[str, Any]:
+        return {"refused": {f"{motion.method} {motion.optimum}": list(motion.faults) for motion in self.refused}}
 
 
 def study(motions: Motions) -> Result | None:
     """The motion that is to be exported, resampled; None if none is asked for, or the method asked for has none."""
-    motion, config = chosen(motions), motions.config.export
-    if motion is None:
-        return Nothing() if config.method == "best" else None
-    return resample(motions.problem, motion, config.rate)
+    asked = motions.config.export.method
+    sent, refused = _sent(motions)
+    if sent is not None:
+        return sent[1]
+    return Nothing(refused) if refused or asked == "best" else None
 
 
 def chosen(motions: Motions) -> Evaluation | None:
-    """The motion to export; None if there is no confirmed one, or none is asked for.
+    """The motion to export; None if none can be sent, or none is asked for."""
+    sent = _sent(motions)[0]
+    return None if sent is None else sent[0]
 
-    The best one keeps every limit and every clearance at its knots, and its path between them too: a method that knows
-    none may go cheaply through a wall. Of a method with several optima, and of all methods, it is the cheapest by the
-    problem's own objective.
+
+def _sent(motions: Motions) -> tuple[tuple[Evaluation, Resampled] | None, tuple[Resampled, ...]]:
+    """The cheapest confirmed motion, by the problem's own objective, that can be sent; and those before it.
+
+    A method that knows no limits may go cheaply through a wall, and an optimum by differences may jump to its speed.
     """
-    asked = motions.config.export.method
-    good = [e for e in motions.solved if asked in ("best", e.method)]
-    if asked == "best":
-        good = [e for e in good if max(e.limit_excess.values(), default=0.0) <= LIMITS and e.on_path]
-    return min(good, key=lambda e: e.objective, default=None)
+    config = motions.config.export
+    refused: list[Resampled] = []
+    good = sorted((e for e in motions.solved if config.method in ("best", e.method)), key=lambda e: e.objective)
+    for motion in good:
+        found = resample(motions.problem, motion, config.rate)
+        if not found.faults:
+            return (motion, found), tuple(refused)
+        refused.append(found)
+    return (good[0], refused[0]) if refused and config.force else None, tuple(refused)
 
 
 def resample(problem: Problem, evaluation: Evaluation, rate: float) -> Resampled:
     """The motion at `rate` [Hz], its last sample at exactly T."""
-    spline = curve(problem, evaluation.time, evaluation.q)
-    everything = whole(problem, evaluation.time, evaluation.solution.trajectory.q)
+    spline = curve(problem, evaluation.time, evaluation.q, evaluation.solution.trajectory.ends)
+    everything = whole(problem, evaluation.solution.trajectory)
     duration = float(evaluation.time[-1])
     time = np.append(np.arange(0.0, duration - 1e-9, 1.0 / rate), duration)
     q, qd, qdd = spline(time), spline(time, 1), spline(time, 2)
     knots = evaluation.time
     fine = np.interp(np.arange(BETWEEN * (len(knots) - 1) + 1) / BETWEEN, np.arange(len(knots)), knots)
     judged = np.union1d(time, fine)  # a slow rate must not hide what happens between its samples
-    checked = audit(problem, judged, everything(judged), everything(judged, 1), everything(judged, 2))
+    checked = audit(problem, judged, everything(judged), *(everything(judged, order) for order in (1, 2, 3)))
     names = problem.task.arm.description.joints
     worst = {kind: (float(judged[row]), names[joint]) for kind, (row, joint) in checked.worst.items()}
     return Resampled(
@@ -122,7 +155,32 @@ def resample(problem: Problem, evaluation: Evaluation, rate: float) -> Resampled
         checked.orientation_error,
         checked.limit_excess,
         worst,
+        tuple(_faults(problem, evaluation, checked, worst)),
     )
+
+
+def _faults(
+    problem: Problem, evaluation: Evaluation, checked: Audit, worst: Mapping[str, tuple[float, str]]
+) -> list[str]:
+    """Why a motion cannot be sent, as the rest of a sentence that begins with its name."""
+    faults, reference, names = [], problem.reference, problem.task.arm.description.actuated
+    speeds, most = np.abs(end_speeds(problem, evaluation.solution.trajectory)), float(np.abs(evaluation.qd).max())
+    for speed, said in zip(speeds, ("starts with a jump of velocity", "ends while it moves"), strict=True):
+        joint = int(speed.argmax())
+        if speed[joint] > RESTS * most:
+            faults.append(f"{said} ({names[joint]} at {speed[joint]:.3g} rad/s)")
+    for kind, excess in checked.limit_excess.items():
+        if excess > TOLERANCE:
+            time, joint_name = worst[kind]
+            whose = f" of {joint_name}" if kind != "clearance" else ""
+            faults.append(f"exceeds the {kind} limit{whose} by {100 * excess:.3g} % at t = {time:.3g} s")
+    for error, allowed, unit, key in (
+        (checked.tracking_error, reference.tolerance, "m", "tolerance"),
+        (checked.orientation_error, reference.orientation_tolerance, "rad", "orientation_tolerance"),
+    ):
+        if not error <= allowed:
+            faults.append(f"is up to {error:.2g} {unit} off its path, more than path.{key} = {allowed:g} {unit}")
+    return faults
 
 
 def sentence(exported: Resampled) -> str:
@@ -132,17 +190,8 @@ def sentence(exported: Resampled) -> str:
     head += f" is at most {exported.tracking_error:.2g} m off its path"
     if exported.orientation_error > 0:
         head += f" and {exported.orientation_error:.2g} rad off its orientation"
-    over = [(kind, excess) for kind, excess in exported.limit_excess.items() if excess > TOLERANCE]
+    if exported.faults:
+        return f"{head}, but it {exported.fault}: not to be sent as it is. {WAY_OUT}"
     if not exported.limit_excess:
         return f"{head}; the run has no limits to check it against"
-    if not over:
-        return f"{head} and meets every limit"
-    parts = []
-    for kind, excess in over:
-        time, joint = exported.worst[kind]
-        whose = f" of {joint}" if kind != "clearance" else ""
-        parts.append(f"exceeds the {kind} limit{whose} by {100 * excess:.3g} % at t = {time:.3g} s")
-    return (
-        f"{head}, but {' and '.join(parts)}; where the knots keep their limits, the curve between them, which starts "
-        "and ends at rest, asks for more: more intervals (timing.steps) or tighter limits give room"
-    )
+    return f"{head} and meets every limit"

@@ -71,7 +71,7 @@ def study(motions: Motions) -> Front | None:
 
 
 def table(front: Sequence[Evaluation]) -> pd.DataFrame:
-    """One row per point: status (optimal, dominated, infeasible, failed), path class, bound, verified costs, knee.
+    """One row per point: status (optimal, dominated, none found, failed), path class, bound, verified costs, knee.
 
     The costs are the evaluation's; `bound_excess` is how far the bounded one is above its bound, relative.
     """
@@ -87,9 +87,9 @@ def table(front: Sequence[Evaluation]) -> pd.DataFrame:
     solved = np.isfinite(values).all(axis=1)
     is_dominated = np.zeros(len(rows), dtype=bool)
     is_dominated[solved] = dominated(values[solved])
-    infeasible = rows["solver_status"].str.contains("infeasib")
+    none_found = rows["solver_status"].str.contains("infeasib")  # from the starts that it had, which proves nothing
     rows["status"] = np.where(
-        ~solved, np.where(infeasible, "infeasible", "failed"), np.where(is_dominated, "dominated", "optimal")
+        ~solved, np.where(none_found, "none found", "failed"), np.where(is_dominated, "dominated", "optimal")
     )
     rows["knee"] = False
     good = np.flatnonzero(solved & ~is_dominated)

@@ -39,12 +39,14 @@ from pipeline.model.arm import Arm
 from pipeline.model.task import PositionTask
 from pipeline.problem.costs import integrals, velocities
 from pipeline.problem.problem import Problem
+from pipeline.program.newton.newton import WARM
+from pipeline.program.newton.serve import Solver, why_not
 from pipeline.program.transcription import transcribe
 from pipeline.robot.description import Description
 from pipeline.studies import style
 from pipeline.studies.study import Motions, Result
 
-FEW = GlobalOptions(starts="population", solver="ipopt", coarse_steps=12, candidates=200, optimised=12)
+FEW = GlobalOptions(starts="population", candidates=200, optimised=12)
 ROUNDS = 5  # of fits, at most, each from the optima at the masses of the one before
 SETTLED = 1e-4  # relative: masses that change less are found
 STEP = 1e-3  # relative, of the differences by the masses
@@ -239,8 +241,17 @@ def _moved(masses: Array, item: tuple[str, str, int, Array]) -> tuple[Array, dic
     name, method, _, q = item
     problem = _problem(name, masses)
     if method == "global":
-        q = transcribe(problem, problem.times, q).solve(tolerance=1e-8, max_iterations=200)[0]
+        q = _again(problem, q)
     return q, quantities(problem, q)
+
+
+def _again(problem: Problem, q: Array) -> Array:
+    """The optimum near q (N + 1, n): by Newton's method where it serves and ends, else by IPOPT."""
+    if why_not(problem) is None:
+        answer = Solver(problem).on(problem.times).solve(q[None], WARM)
+        if answer.converged[0]:
+            return answer.q[0]
+    return transcribe(problem, problem.times, q).solve(tolerance=1e-8, max_iterations=200)[0]
 
 
 def quantities(problem: Problem, q: Array) -> dict[str, float]:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pipeline.studies import (
     candidates,
-    certificate,
     closed_loop,
     convergence,
+    estimate,
     export,
     front,
     identification,
@@ -15,7 +15,7 @@ from pipeline.studies import (
 from pipeline.studies.study import Study
 
 STUDIES: tuple[Study, ...] = (
-    certificate.study,
+    estimate.study,
     validation.study,
     front.study,
     convergence.study,

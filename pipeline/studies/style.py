@@ -35,7 +35,7 @@ def color(label: str) -> str:
 
 
 def name(label: str) -> str:
-    """The name of a motion for legends and titles: `Global optimum 2`."""
+    """The name of a motion for legends and titles: `Planner's optimum 2`."""
     method, optimum = _split(label)
     numbered = optimum > 1 or method == "pareto"
     title = METHODS[method].title if method in METHODS else method

@@ -13,6 +13,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from pipeline.common.arrays import Array
 from pipeline.common.markdown import cells, markdown_table
 from pipeline.evaluation.evaluation import Evaluation
 from pipeline.model.kinematics import wrap
@@ -45,7 +46,8 @@ def table(motions: Motions) -> pd.DataFrame:
     """One row per confirmed motion of either method, paired by joint path."""
     revolute = motions.problem.task.arm.description.revolute
     planner, stationary = motions.confirmed("global"), motions.confirmed("calculus_of_variations")
-    pairs = _pairs(planner, stationary, revolute)
+    intervals = len(motions.problem.times) - 1
+    pairs = _pairs([_at_knots(e, intervals) for e in planner], [_at_knots(e, intervals) for e in stationary], revolute)
     rows: list[dict[str, Any]] = []
     for index, e in enumerate(planner):
         row: dict[str, Any] = {"planner_optimum": e.solution.optimum, "planner_objective": e.objective}
@@ -54,7 +56,7 @@ def table(motions: Motions) -> pd.DataFrame:
             row |= {
                 "stationary_motion": other.solution.optimum,
                 "stationary_objective": other.solution.statistics["integral"],
-                "mean_absolute_difference": float(np.abs(wrap(e.q - other.q, revolute)).mean()),
+                "mean_absolute_difference": _mean_difference(e, other, intervals, revolute),
                 "kind": other.solution.statistics["kind"],
             }
         else:
@@ -89,12 +91,20 @@ def table(motions: Motions) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=[*columns, "kind", "remark"])
 
 
-def _pairs(planner: list[Evaluation], stationary: list[Evaluation], revolute: NDArray[np.bool_]) -> dict[int, int]:
+def _at_knots(motion: Evaluation, intervals: int) -> Array:
+    """A motion (N + 1, n) at the knots of the problem, where its own are parts of their intervals."""
+    return motion.q[:: (len(motion.time) - 1) // intervals]
+
+
+def _mean_difference(one: Evaluation, other: Evaluation, intervals: int, revolute: NDArray[np.bool_]) -> float:
+    """[rad] of the joints at the knots of the problem."""
+    return float(np.abs(wrap(_at_knots(one, intervals) - _at_knots(other, intervals), revolute)).mean())
+
+
+def _pairs(planner: list[Array], stationary: list[Array], revolute: NDArray[np.bool_]) -> dict[int, int]:
     """Which stationary motion belongs to which optimum: one to one, nearest first."""
     distances = sorted(
-        (path_distance(e.q, other.q, revolute), i, j)
-        for i, e in enumerate(planner)
-        for j, other in enumerate(stationary)
+        (path_distance(q, other, revolute), i, j) for i, q in enumerate(planner) for j, other in enumerate(stationary)
     )
     pairs: dict[int, int] = {}
     for distance, i, j in distances:

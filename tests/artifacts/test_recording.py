@@ -56,9 +56,9 @@ def make_problem(file: Path) -> Problem:
 
 @pytest.fixture(scope="module")
 def case() -> Case:
-    """LSV, which meets a singularity, the global optimum and, to have two of one method, that again as its second."""
+    """LSV, which meets a singularity, the planner's best and, to have two of one method, that again as its second."""
     problem = make_problem(ROBOT)
-    best = global_planner(problem, GlobalOptions(candidates=50, starts="both"))[0]
+    best = global_planner(problem, GlobalOptions(candidates=50, starts=["population", "dynamic_programming"]))[0]
     solutions = [lsv(problem, LsvOptions())[0], best, dataclasses.replace(best, optimum=2)]
     return problem, [evaluate(problem, solution) for solution in solutions]
 
@@ -254,7 +254,7 @@ def test_one_colour_per_motion() -> None:
     colors = [style.color(label) for label in (*METHODS, "global 2", "global 3", "pmke 2")]
     assert len(set(colors)) == len(colors)
     assert style.color("global") == METHODS["global"].color
-    assert style.name("global 2") == "Global optimum 2"
+    assert style.name("global 2") == "Planner's optimum 2"
     assert blueprint.slug("global 2") == "global_2"
 
 

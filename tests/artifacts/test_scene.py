@@ -15,9 +15,12 @@ from pipeline.artifacts.scene import box, corners
 from pipeline.build.problem import prepare
 from pipeline.evaluation.base import BaseMotion
 from pipeline.run.run import run
+from tests.once import made_once
 from tests.support import FEW_STARTS, composed
 
 SMALL = (
+    "method.global.refine_to=null",
+    "method.global.starts=population",
     *FEW_STARTS,
     "timing.steps=20",
     "method.global.optimised=2",
@@ -26,11 +29,13 @@ SMALL = (
 )
 
 
-@pytest.fixture(scope="module")
+def run_small(folder: Path) -> None:
+    assert run(composed("+experiment=floating3r", *SMALL, "parallel.workers=1"), folder / "results") == 0
+
+
+@pytest.fixture(scope="session")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    made = tmp_path_factory.mktemp("floating")
-    assert run(composed("+experiment=floating3r", *SMALL, "parallel.workers=1"), made) == 0
-    return made
+    return made_once(tmp_path_factory, "floating", run_small) / "results"
 
 
 @pytest.mark.slow
@@ -97,6 +102,8 @@ def test_front_of_rotation_against_energy(tmp_path: Path) -> None:
     """The trade that the PMKE paper names: at least ten points, none dominated, each bound met."""
     words = (
         *FEW_STARTS,
+        "method.global.refine_to=null",
+        "method.global.starts=population",
         "timing.steps=16",
         "method.global.optimised=2",
         "method.pareto.steps=6",

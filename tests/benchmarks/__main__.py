@@ -16,12 +16,13 @@ from scipy.interpolate import CubicSpline
 from pipeline.build.problem import prepare
 from pipeline.config.methods import GlobalOptions, PmkeOptions
 from pipeline.config.run import check
-from pipeline.methods.global_planner.planner import STEPS, global_planner, refinement
+from pipeline.methods.global_planner.grids import refinement
+from pipeline.methods.global_planner.planner import STEPS, global_planner
 from pipeline.methods.pmke.predictive import pmke
 from pipeline.methods.pmke.window import Window
 from pipeline.problem.lagrangian import Lagrangian
 from pipeline.program.transcription import transcribe
-from tests.benchmarks import peer, planner
+from tests.benchmarks import bound, peer, planner
 
 REPEATS = 7
 
@@ -91,9 +92,12 @@ def fine_solve(repeats: int = REPEATS) -> None:
 
 
 def main(words: list[str]) -> None:
-    """All parts, or only `small` or `planner`, and of that only the simulations named."""
-    if words and words[0] not in ("small", "planner"):
-        sys.exit(f"{words[0]}: not one of small, planner")
+    """Small programs and whole plans, or only `small` or `planner`, of that only the simulations named; or `bound`."""
+    if words and words[0] not in ("small", "planner", "bound"):
+        sys.exit(f"{words[0]}: not one of small, planner, bound")
+    if words[:1] == ["bound"]:
+        bound.main(words[1:])
+        return
     if words[:1] != ["planner"]:
         print(f"{'medians':<34} {'ours [ms]':>9} {'peer [ms]':>9} {'ratio':>7}")
         predictions()

@@ -10,6 +10,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from unittest import mock
 
 import numpy as np
@@ -18,15 +19,18 @@ from pipeline.build.problem import prepare
 from pipeline.common.arrays import Array
 from pipeline.config.methods import GlobalOptions
 from pipeline.methods.global_planner import optimum, planner
+from pipeline.methods.global_planner.basins import basins
 from pipeline.methods.global_planner.batch import Batch
+from pipeline.methods.global_planner.grids import refinement
 from pipeline.methods.global_planner.optimum import Optimum
+from pipeline.methods.global_planner.starts import Starts
 from pipeline.methods.method import Context
 from pipeline.problem.costs import objective_values
 from pipeline.problem.problem import Boundary, Problem
-from tests.benchmarks import peer
+from tests.benchmarks import floating, peer
 from tests.support import composed
 
-SIMULATIONS = ("sim1", "sim2", "sim3", "sim4", "sim5")
+SIMULATIONS = ("sim1", "sim2", "sim3", "sim4", "sim5", "floating3r")
 CONVERGED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
 HEAD = f"{'planner: whole plans':<24} {'ours [ms]':>9} {'peer [ms]':>9} {'ratio':>7} {'starts [ms]':>11}"
 REPEATS = 3
@@ -37,31 +41,36 @@ class Peer:
 
     def __init__(self) -> None:
         self.construction = 0.0
-        self.programs: dict[tuple[int, bool, bool], peer.Program] = {}
+        self.programs: dict[tuple[int, bool, bool], peer.Program | floating.Program] = {}
         self.arm = peer.PlanarArm.from_urdf(peer.ROBOT)
 
-    def program(self, problem: Problem, times: Array, options: GlobalOptions) -> peer.Program:
+    def program(self, problem: Problem, times: Array, options: GlobalOptions) -> peer.Program | floating.Program:
         limits, torque = problem.bounds, problem.objective.weight("torque") > 0
         key = (len(times), torque, bool(np.isfinite(limits.torque).any()))
         if key not in self.programs:
             begin = time.process_time()
-            self.programs[key] = peer.Program(
-                self.arm,
-                times,
-                problem.reference.position(times),
-                torque,
-                problem.boundary is Boundary.CYCLIC,
-                (limits.lower, limits.upper, limits.velocity, limits.torque, limits.power),
-                {
-                    "tol": options.tolerance,
-                    "max_iter": options.max_iterations,
-                    "mu_init": 1e-3,
-                    "bound_relax_factor": 0.0,
-                    "constr_viol_tol": 1e-8,
-                    "acceptable_tol": 1e-6,
-                    "acceptable_constr_viol_tol": 1e-8,
-                },
-            )
+            path = problem.reference.position(times)
+            given = {
+                "tol": options.tolerance,
+                "max_iter": options.max_iterations,
+                "mu_init": 1e-3,
+                "bound_relax_factor": 0.0,
+                "constr_viol_tol": 1e-8,
+                "acceptable_tol": 1e-6,
+                "acceptable_constr_viol_tol": 1e-8,
+            }
+            if problem.task.arm.base.count:
+                self.programs[key] = floating.Program(times, path, problem.q_init, given)
+            else:
+                self.programs[key] = peer.Program(
+                    self.arm,
+                    times,
+                    path,
+                    torque,
+                    problem.boundary is Boundary.CYCLIC,
+                    (limits.lower, limits.upper, limits.velocity, limits.torque, limits.power),
+                    given,
+                )
             self.construction += time.process_time() - begin
         return self.programs[key]
 
@@ -81,19 +90,21 @@ class Plan:
     def __init__(self, name: str, *words: str) -> None:
         config = composed(f"+experiment={name}", *words)
         self.problem, self.options = prepare(config), config.method.of("global")
-        self.grids = planner.refinement(self.problem.times, self.options.coarse_steps or planner.STEPS)
+        self.alone = Batch.without(self.problem, replace(self.options, solver="newton"))
+        usual = planner.STEPS_ALONE if self.alone else planner.STEPS
+        self.grids = refinement(self.problem.times, self.options.coarse_steps or usual)
         begin = time.process_time()
-        self.motions, _ = planner._starts(self.problem, self.grids[0], self.options, np.random.default_rng(config.seed))
+        self.motions = Starts(self.problem, self.grids[0], self.options, np.random.default_rng(config.seed)).first
         self.drawn = time.process_time() - begin
         self.peer = Peer()
 
     def ours(self) -> list[Optimum]:
         """The planner's own steps."""
         problem, grids, options = self.problem, self.grids, self.options
-        batch, context = Batch(problem, options), Context()
+        batch, context = None if self.alone else Batch(problem, options), Context()
         starts = planner._optimise_starts(problem, grids[0], options, self.motions, batch, context)
-        basins = [starts[index] for index in planner._basins(problem, starts, options)]
-        return self._kept(planner._refine_all(problem, grids, options, basins, batch, context))
+        chosen = basins(problem, grids[0], starts, options.same_path).optima
+        return self._kept(planner._refine_all(problem, grids, options, chosen, batch, context))
 
     def theirs(self) -> list[Optimum]:
         """The same steps, every solve by the peer."""
@@ -101,15 +112,15 @@ class Plan:
         first = optimum.first_order(problem)
         with mock.patch.object(optimum, "optimise", self.peer.optimise):
             starts = [self.peer.optimise(first, grids[0], motion, options) for motion in self.motions]
-            chosen = [starts[index] for index in planner._basins(problem, starts, options)]
+            chosen = basins(problem, grids[0], starts, options.same_path).optima
             if first is not problem:
                 starts = [optimum.go_on((problem, grids[0], options), start) for start in chosen]
-                chosen = [starts[index] for index in planner._basins(problem, starts, options)]
+                chosen = basins(problem, grids[0], starts, options.same_path).optima
             return self._kept([optimum.refine((problem, grids, options), start) for start in chosen])
 
     def _kept(self, fine: list[Optimum]) -> list[Optimum]:
         good = [one for one in fine if one.converged and one.continuous]
-        return [good[index] for index in planner._distinct(good, self.options, self.problem)]
+        return basins(self.problem, self.problem.times, good, self.options.same_path).optima
 
 
 def simulation(name: str, *words: str) -> None:
@@ -132,7 +143,7 @@ def simulation(name: str, *words: str) -> None:
     agreement(plan.problem, plan.peer.program(plan.problem, plan.problem.times, plan.options), found)
 
 
-def agreement(problem: Problem, program: peer.Program, found: dict[str, list[Optimum]]) -> None:
+def agreement(problem: Problem, program: peer.Program | floating.Program, found: dict[str, list[Optimum]]) -> None:
     """Every optimum recomputed by both sides, by the peer with path and limits, and whether the lists agree."""
     everything = [one for optima in found.values() for one in optima]
     checks = [program.check(one.q) for one in everything]

@@ -29,9 +29,9 @@ def test_small_programs(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["sim1", "sim5"])
+@pytest.mark.parametrize("name", ["sim1", "sim5", "floating3r"])
 def test_the_planner_beside_its_peer(name: str, capsys: pytest.CaptureFixture[str]) -> None:
-    """sim1: energy, free; sim5: a cycle with limits."""
+    """sim1: energy, free; sim5: a cycle with limits; floating3r: momentum."""
     planner.simulation(name, *FEW_STARTS, "method.global.optimised=12", "timing.steps=24")
     out = capsys.readouterr().out
     assert all(number > 0 for number in line_of(name, out))
@@ -41,7 +41,13 @@ def test_the_planner_beside_its_peer(name: str, capsys: pytest.CaptureFixture[st
     assert float(re.findall(r"limits kept to (\S+)", out)[0]) < 1e-6
 
 
-@pytest.mark.parametrize("words", [["large"], ["planner", "sim9"]])
+def test_a_bound_from_below(capsys: pytest.CaptureFixture[str]) -> None:
+    benchmarks.main(["bound", "traj4:6"])
+    out = capsys.readouterr().out
+    assert re.search(r"^traj4 +6 +0\.02\S+ +0\.0\S+ % ", out, re.M)
+
+
+@pytest.mark.parametrize("words", [["large"], ["planner", "sim9"], ["bound", "sim9"]])
 def test_an_unknown_part_is_refused(words: list[str]) -> None:
     with pytest.raises(SystemExit, match="not one of"):
         benchmarks.main(words)

@@ -44,8 +44,9 @@ PANDA = ("robot=panda", "path.direction=[0,1,0]", "path.length=0.1")
         ),
         (("objective=reaction", "methods=[pontryagin]"), r"pontryagin: the base is (held|floating); .* fixed base"),
         (
-            (*FREE, "method.global.starts=both"),
-            r"global: method\.global\.starts = both: dynamic_programming: the base is floating; .* starts = roadmap",
+            (*FREE, "method.global.starts=[population,dynamic_programming]"),
+            r"global: method\.global\.starts = population, dynamic_programming: dynamic_programming: "
+            r"the base is floating; .* starts = roadmap",
         ),
         ((*FREE, "closed_loop.run=true"), r"closed_loop\.run: the controller is one for arms on a fixed base"),
         (("objective=reaction", "objective.torque=0"), r"objective = reaction: all its weights are zero"),

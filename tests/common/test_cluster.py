@@ -33,6 +33,7 @@ from pipeline.run.run import UNFINISHED
 from tests.commands import assert_refused, call
 from tests.common.test_workers import SIM1
 from tests.killed import run_and_kill
+from tests.reports import leave_out_pictures
 from tests.support import ROOT
 from tests.tasks import (
     HUNG,
@@ -241,6 +242,7 @@ def test_a_killed_run_goes_on_elsewhere(
     two_workers: Cluster, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     """kill -9 of a run on the cluster, started again here: nothing that was finished is solved again."""
+    leave_out_pictures(monkeypatch)
     sizes = ("configurations=8", "candidates=100", "optimised=12")
     words = ["+experiment=sim1", "timing.steps=24", *(f"method.global.{size}" for size in sizes)]
     there, here = ["parallel=dask", f"parallel.address={two_workers.address}"], ["parallel.workers=1"]

@@ -11,9 +11,9 @@ from scipy.interpolate import CubicSpline
 
 from pipeline.build.problem import prepare
 from pipeline.common.arrays import Array
-from pipeline.evaluation.curve import curve, turns_of_cycle
 from pipeline.evaluation.evaluation import evaluate
 from pipeline.model.kinematics import project
+from pipeline.problem.curve import curve, turns_of_cycle
 from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Solution, Status, Trajectory
 from tests.support import composed

@@ -26,7 +26,10 @@ from pipeline.program.transcription import transcribe
 from tests.program.test_program import program_jacobian, program_value
 from tests.support import composed
 
-FEW = tuple(f"method.global.{key}" for key in ("configurations=8", "candidates=100", "optimised=2"))
+FEW = tuple(
+    f"method.global.{key}"
+    for key in ("starts=population", "configurations=8", "candidates=100", "optimised=2", "refine_to=null")
+)
 SHORT = ("timing.duration=4", "timing.steps=30", *FEW)
 BETWEEN = "path.tolerance=1e-3"  # the grids are coarse
 ON_BASE = ("robot=planar3r_base", "base=free", BETWEEN, *SHORT)
@@ -119,10 +122,8 @@ def test_momentum_that_is_given_is_kept() -> None:
     assert e.base.floating is not None
     assert max(e.base.floating.linear, e.base.floating.angular) < 1e-6
     plant, last = BasePlant(problem.task.arm), e.base.floating
-    rest = np.zeros(3)
-    moving = plant.follow(
-        last.position[0], last.rotation[0].as_quat(), e.q[0], rest, np.array([0.05, 0, 0, 0, 0, 0.02])
-    )
+    ((alone,), (adds,)), given = plant.driven(e.q[:1], np.zeros((1, 3))), np.array([0.05, 0, 0, 0, 0, 0.02])
+    moving = plant.velocity(last.position[0], last.rotation[0].as_quat(), alone, adds, given)
     assert np.abs(moving).max() > 1e-3  # before the joints move, the base does
 
 
@@ -183,8 +184,7 @@ def test_cycles_in_space(orientation: str) -> None:
         "timing.duration=4",
         "timing.steps=24",
         BETWEEN,
-        "method.global.candidates=40",
-        "method.global.optimised=2",
+        *(f"method.global.{word}" for word in ("starts=population", "refine_to=null", "candidates=40", "optimised=2")),
     )[1]
     assert e.status is Status.SOLVED, e.message
     assert np.abs(e.q[-1] - e.q[0]).max() < 1e-9
@@ -213,9 +213,10 @@ def test_heavy_bases_are_fixed_ones_in_the_limit() -> None:
     words = (
         *SHORT,
         "path.length=0.2",
-        "timing.steps=16",
+        "timing.steps=8",
+        "method.global.optimised=1",
         "method.pmke.prediction_step=0.8",
-        "method.pmke.update_interval=0.4",
+        "method.pmke.update_interval=0.8",
     )
 
     def energies(*base: str) -> tuple[Array, float]:

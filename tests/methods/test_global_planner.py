@@ -14,7 +14,8 @@ from pipeline.common.workers import Workers
 from pipeline.config.compose import checked
 from pipeline.config.run import RunConfig
 from pipeline.evaluation.evaluation import Evaluation, evaluate
-from pipeline.methods.global_planner.planner import global_planner, refinement
+from pipeline.methods.global_planner.grids import refinement
+from pipeline.methods.global_planner.planner import global_planner
 from pipeline.methods.method import Context
 from pipeline.path.curves import Line
 from pipeline.path.reference import Reference
@@ -152,7 +153,7 @@ def test_statistics_tell_how_the_optima_were_found() -> None:
     _, motions = solved("+experiment=sim2", *FEW)
     log = motions[0].solution.statistics
     assert log["grids"] == [12, 25, 50, 100]
-    assert len(log["starts"]) <= 12
+    assert len(log["starts"]) == 24  # twelve, and as many that brought nothing new
     members = [motion.solution.statistics["starts_in_basin"] for motion in motions]
     assert all(count >= 1 for count in members)
     assert sum(members) <= sum(start["converged"] for start in log["starts"])
@@ -196,6 +197,14 @@ def test_the_best_of_longer_searches_is_found(name: str) -> None:
     problem, motions = solved(f"+experiment={name}", "methods=[global]")
     assert_sound(problem, motions)
     assert motions[0].energy_integral[-1] == pytest.approx(right, rel=1e-5)
+
+
+@pytest.mark.slow
+def test_the_best_motion_of_an_arm_that_floats() -> None:
+    """floating3r's is 0.021321 J s by an independent code; its starts once came from one weighted population alone."""
+    _, motions = solved("+experiment=floating3r", "methods=[global]")
+    assert motions[0].energy_integral[-1] == pytest.approx(0.021321, rel=1e-4)
+    assert motions[0].tracking_error.max() < 1e-8
 
 
 COARSE = ("+experiment=sim1", "timing.steps=12", *(f"method.global.{k}" for k in ("configurations=8", "candidates=80")))
@@ -310,7 +319,7 @@ def test_progress_counts_every_start_and_never_gets_worse() -> None:
     context = Context(progress=lambda done, total, best: said.append((done, total, best)))
     solutions = global_planner(prepare(config), config.method.global_, context)
     assert [done for done, _, _ in said] == list(range(1, len(said) + 1))
-    assert {total for _, total, _ in said} == {len(said)}
+    assert all(done <= total <= len(said) for done, total, _ in said)
     best = [cost for _, _, cost in said]
     assert best == sorted(best, reverse=True)
     starts = solutions[0].statistics["starts"]

@@ -20,7 +20,7 @@ from pipeline.run.solve import solve
 from pipeline.run.state import state
 from tests.support import composed
 
-FEW = ("configurations=4", "candidates=30", "optimised=4", "same_path=0.5")
+FEW = ("configurations=4", "candidates=30", "optimised=1", "same_path=0.5", "refine_to=null")
 SMALL = (
     *(f"method.global.{word}" for word in FEW),
     *(
@@ -30,8 +30,15 @@ SMALL = (
         "method.lsv.dt=0.1",
         "method.inertia_weighted.dt=0.1",
     ),
-    *("method.pmke.dt=0.02", "method.pareto.steps=2", "method.pareto.rounds=0", "method.receding.update_interval=2"),
+    *(
+        "method.pmke.dt=0.02",
+        "method.pareto.steps=2",
+        "method.pareto.rounds=0",
+        "method.pareto.max_iterations=60",
+        "method.receding.update_interval=2",
+    ),
     *("method.dynamic_programming.nodes=60", "method.dynamic_programming.intervals=6"),
+    *("method.lower_bound.intervals=6", "method.lower_bound.cells=30"),
     *("method.calculus_of_variations.spacing=0.3", "method.calculus_of_variations.refinements=1"),
     *("method.calculus_of_variations.max_speed=0.5", "method.pontryagin.guesses=2", "method.pontryagin.intervals=10"),
 )
@@ -47,6 +54,7 @@ PROBLEMS = {
         *SMALL,
         "objective=reaction",
         "method.pmke.objective=kinetic_energy",
+        "method.receding.objective=kinetic_energy",
         "method.pareto.objectives=[reaction_force,torque]",
     ),
     "r = 2": (*SMALL, "robot=planar4r"),
@@ -55,8 +63,8 @@ BASELINES = {"lsv", "inertia_weighted", "pmke", "receding", "global", "pareto"}
 SERVED = {
     "fixed": set(METHODS),
     "free": set(METHODS),
-    "cyclic": BASELINES | {"dynamic_programming"},
-    "limits": BASELINES | {"dynamic_programming"},
+    "cyclic": BASELINES | {"dynamic_programming", "lower_bound"},
+    "limits": BASELINES | {"dynamic_programming", "lower_bound"},
     "torque": BASELINES,
     "floating": BASELINES,
     "held": BASELINES,
@@ -126,20 +134,20 @@ def test_a_run_calls_its_methods_in_order_with_their_own_options() -> None:
     assert all(second > 0 for second in seconds.values())
 
 
-@pytest.mark.parametrize("starts", ["dynamic_programming", "both"])
-def test_starts_by_dynamic_programming_serve_what_it_serves(starts: str) -> None:
+@pytest.mark.parametrize("starts", ["dynamic_programming", ["population", "dynamic_programming"]])
+def test_starts_by_dynamic_programming_serve_what_it_serves(starts: str | list[str]) -> None:
     options = GlobalOptions(starts=starts)
     assert METHODS["global"].why_not(prepare(asked("limits", "global")), options) is None
     for problem in ("torque", "floating", "r = 2"):
         line = METHODS["global"].why_not(prepare(asked(problem, "global")), options)
         assert line is not None
-        assert line.startswith(f"global: method.global.starts = {starts}: dynamic_programming: ")
+        assert line.startswith(f"global: method.global.starts = {', '.join(options.generators)}: dynamic_programming: ")
         assert line.endswith("; starts = roadmap serves every problem")
 
 
 def test_a_front_is_refused_where_the_planner_is_or_two_integrals_are_not_given() -> None:
     pareto, problem = METHODS["pareto"], prepare(asked("fixed", "pareto"))
-    by_grid = ParetoOptions(planner=GlobalOptions(starts="both"))
+    by_grid = ParetoOptions(planner=GlobalOptions(starts=["population", "dynamic_programming"]))
     line = pareto.why_not(problem, by_grid)
     assert line is not None
     assert "the objective holds a torque or reaction integral" in line

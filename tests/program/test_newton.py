@@ -9,13 +9,18 @@ import pytest
 
 from pipeline.build.problem import prepare
 from pipeline.common.arrays import Array
+from pipeline.model.clearance import Clearance
+from pipeline.model.kernel.chain import Chain
+from pipeline.problem.costs import integrals, objective_values, velocities
 from pipeline.problem.objective import Objective
 from pipeline.problem.problem import Boundary, Problem
 from pipeline.program.confirm import confirm
-from pipeline.program.newton import triangular
+from pipeline.program.newton import stencils, triangular
 from pipeline.program.newton.banded import Banded
 from pipeline.program.newton.bounds import Bounds
+from pipeline.program.newton.clear import Clear
 from pipeline.program.newton.knots import Knots
+from pipeline.program.newton.momentum import Momentum
 from pipeline.program.newton.newton import Newton
 from pipeline.program.newton.serve import Solver, why_not
 from pipeline.search.roadmap import Roadmap
@@ -24,33 +29,40 @@ from tests.support import composed, differences
 BOUNDARIES = list(Boundary)
 
 
-def dense(diagonal: Array, off: Array, cyclic: bool) -> Array:
-    """(U s, U s) of blocks (U, s, s)."""
-    count, size = diagonal.shape[:2]
+def dense(blocks: tuple[Array, ...], cyclic: bool) -> Array:
+    """(U s, U s) of blocks (U, s, s) on the diagonal and above it."""
+    count, size = blocks[0].shape[:2]
     out = np.zeros((count, size, count, size))
-    for k in range(count):
-        out[k, :, k] += diagonal[k]
-    for k, block in enumerate(off):
-        out[k, :, (k + 1) % count] += block
-        out[(k + 1) % count, :, k] += block.T
-    assert len(off) == (count if cyclic else count - 1)
+    for apart, band in enumerate(blocks):
+        assert len(band) == (count if cyclic else count - apart)
+        for k, block in enumerate(band):
+            other = (k + apart) % count
+            out[k, :, other] += block
+            if apart:
+                out[other, :, k] += block.T
     return out.reshape(count * size, count * size)
 
 
 @pytest.mark.parametrize("cyclic", [False, True])
-@pytest.mark.parametrize("size", [1, 2, 3])
-def test_banded_systems(cyclic: bool, size: int, rng: np.random.Generator) -> None:
+@pytest.mark.parametrize(("size", "reach"), [(1, 1), (2, 1), (3, 1), (1, 2), (2, 2)])
+def test_banded_systems(cyclic: bool, size: int, reach: int, rng: np.random.Generator) -> None:
     count = 7
     diagonal = rng.normal(size=(2, count, size, size))
-    diagonal = diagonal + diagonal.swapaxes(-1, -2) + 8 * size * np.eye(size)
-    off = rng.normal(size=(2, count if cyclic else count - 1, size, size))
-    right = rng.normal(size=(2, count, size))
-    band = Banded(count, size, cyclic)
-    x, changed = band.solve(band.assemble(diagonal, off), np.empty(0), right)
+    diagonal = diagonal + diagonal.swapaxes(-1, -2) + 8 * reach * size * np.eye(size)
+    off = [rng.normal(size=(2, count if cyclic else count - j, size, size)) for j in range(1, reach + 1)]
+    blocks, right = (diagonal, *off), rng.normal(size=(2, count, size))
+    band, knots = Banded(count, size, cyclic, reach), Knots(Boundary.CYCLIC if cyclic else Boundary.FIXED, np.arange(8))
+    x, _, changed = band.solve(band.assemble(blocks), np.empty(0), right)
     assert changed == 0
+    rows, target = rng.normal(size=(2, 4, count * size)), rng.normal(size=(2, 4))
+    tied, nu, _ = band.solve(band.assemble(blocks), np.empty(0), right, rows, target)
     for s in range(2):
-        exact = np.linalg.solve(dense(diagonal[s], off[s], cyclic), right[s].ravel())
-        np.testing.assert_allclose(x[s].ravel(), exact, atol=1e-12)
+        whole = dense(tuple(block[s] for block in blocks), cyclic)
+        np.testing.assert_allclose(x[s].ravel(), np.linalg.solve(whole, right[s].ravel()), atol=1e-12)
+        np.testing.assert_allclose(knots.product(blocks, right)[s].ravel(), whole @ right[s].ravel(), atol=1e-12)
+        both = np.block([[whole, rows[s].T], [rows[s], np.zeros((4, 4))]])
+        exact = np.linalg.solve(both, np.concatenate([right[s].ravel(), target[s]]))
+        np.testing.assert_allclose(np.concatenate([tied[s].ravel(), nu[s]]), exact, atol=1e-10)
 
 
 def test_an_indefinite_system_fades_into_a_positive_one(rng: np.random.Generator) -> None:
@@ -58,7 +70,7 @@ def test_an_indefinite_system_fades_into_a_positive_one(rng: np.random.Generator
     bad, good = -np.ones((1, 5, 1, 1)), 2 * np.ones((1, 5, 1, 1))
     off = np.zeros((1, 4, 1, 1))
     right = rng.normal(size=(1, 5, 1))
-    x, changed = band.solve(band.assemble(bad, off), band.assemble(good, off), right)
+    x, _, changed = band.solve(band.assemble((bad, off)), band.assemble((good, off)), right)
     assert changed == 1
     np.testing.assert_allclose(x, right / (0.4 * -1 + 0.6 * 2))
 
@@ -105,9 +117,9 @@ def test_derivatives_of_whole_motions(boundary: Boundary, rng: np.random.Generat
         flat = x[s].ravel()
         scale = float(np.abs(point.gradient[s]).max())
         np.testing.assert_allclose(point.gradient[s].ravel(), differences(cost, flat), atol=1e-7 * scale)
-        hessian = dense(point.diagonal[s], point.off[s], knots.cyclic)
+        hessian = dense(tuple(block[s] for block in point.hessian), knots.cyclic)
         np.testing.assert_allclose(hessian, differences(gradient, flat), atol=1e-7 * np.abs(hessian).max())
-    value, error = motions.value(x, begin)
+    value, error, *_ = motions.value(x, begin)
     np.testing.assert_allclose(value, point.cost, rtol=1e-13)
     np.testing.assert_array_equal(error, point.error)
 
@@ -133,9 +145,106 @@ def test_rows_of_limits_and_their_transpose(boundary: Boundary, rng: np.random.G
     np.testing.assert_allclose((bounds.change(d) * z).sum(axis=1), (d * bounds.pull(z)).sum(axis=(1, 2)))
     on, above = bounds.weigh(z)
     blocks = on[..., None] * np.eye(4), above[..., None] * np.eye(4)
-    np.testing.assert_allclose(
-        (d * knots.product(*blocks, d)).sum(axis=(1, 2)), (z * bounds.change(d) ** 2).sum(axis=1)
-    )
+    np.testing.assert_allclose((d * knots.product(blocks, d)).sum(axis=(1, 2)), (z * bounds.change(d) ** 2).sum(axis=1))
+
+
+@pytest.mark.parametrize("boundary", BOUNDARIES)
+@pytest.mark.parametrize("reach", [0, 1, 2])
+def test_rows_of_intervals_and_their_transpose(boundary: Boundary, reach: int, rng: np.random.Generator) -> None:
+    """Beside a dense Jacobian; what comes before the first unknown does not count."""
+    knots, n, rows = Knots(boundary, np.arange(8.0)), 2, 3
+    count = knots.count
+    by = tuple(rng.normal(size=(2, count, rows, n)) for _ in range(reach + 1))
+    whole = np.zeros((2, count, rows, count, n))
+    for k in range(count):
+        for s in range(reach + 1):
+            if k >= s or knots.cyclic:
+                whole[:, k, :, k - s] += by[s][:, k]
+    d, z = rng.normal(size=(2, count, n)), rng.random((2, count, rows))
+    np.testing.assert_allclose(stencils.change(knots, by, d), np.einsum("skrjn,sjn->skr", whole, d), atol=1e-12)
+    np.testing.assert_allclose(stencils.pull(knots, by, z), np.einsum("skrjn,skr->sjn", whole, z), atol=1e-12)
+    np.testing.assert_array_equal(stencils.dense(knots, by), whole.reshape(2, count * rows, -1))
+    squares = np.einsum("skria,skr,skrjb->siajb", whole, z, whole).reshape(2, count * n, -1)
+    for s in range(2):
+        found = dense(tuple(block[s] for block in stencils.weigh(knots, by, z)), knots.cyclic)
+        np.testing.assert_allclose(found, squares[s], atol=1e-12)
+
+
+def test_clearance_rows_are_drakes(rng: np.random.Generator) -> None:
+    problem = prepare(composed("+experiment=panda_obstacle", "timing.steps=6"))
+    assert problem.obstacles is not None
+    rows = Clear(Clearance(problem.task.arm, problem.obstacles).rows())
+    near = np.array([-1.35, 0.04, 0.4, -2.1, -2.3, 1.2, 0.7])
+    x = near + rng.normal(scale=0.02, size=(1, 3, 7))
+    *_, kept, (by,) = rows.differentiate(x, x)
+    assert (np.abs(by).max(axis=(1, 2, 3)) > 0.1).all()
+    slope = differences(lambda flat: rows.values(flat.reshape(x.shape), x)[1].ravel(), x.ravel())
+    np.testing.assert_allclose(by[0, :, 0], np.einsum("kkn->kn", slope.reshape(3, 3, 7)), atol=1e-6)
+    np.testing.assert_array_equal(rows.values(x, x)[1], kept)
+
+
+@pytest.mark.parametrize("boundary", BOUNDARIES)
+@pytest.mark.parametrize("enters", ["rest", "speed", "velocity"])
+def test_derivatives_of_torques(boundary: Boundary, enters: str, rng: np.random.Generator) -> None:
+    """Cost and limits beside Drake's torques; gradients, and the Hessian of the whole Lagrangian, by differences."""
+    timing = "constant_speed" if enters == "speed" else "raised_cosine"
+    words = ("limits=joint_torque_power", f"timing={timing}", "timing.steps=7", "path=circle", "path.radius=0.05")
+    problem = prepare(composed("robot=planar4r", *words))
+    given = np.array([0.1, -0.2, 0.3, 0.1]) if enters == "velocity" else None
+    objective = Objective({"kinetic_energy": 0.7, "torque": 0.3})
+    problem = replace(problem, boundary=boundary, objective=objective, qd_init=given)
+    newton = Solver(problem).on(problem.times)
+    motions, knots, scale = newton.motions, newton.knots, 1.7
+    x = knots.unknown(problem.q_init + 0.1 * rng.normal(size=(1, 8, 4)))
+    begin = np.zeros((1, 1, 4)) if knots.cyclic else problem.q_init[None, None]
+    point, whole = motions.differentiate(x, begin), knots.whole(x, begin)
+    assert point.cost == pytest.approx(objective_values(problem, problem.times, whole), rel=1e-9)
+    tau, qd = integrals(problem, problem.times, whole[0]).tau[1:], velocities(problem, problem.times, whole[0])[1:]
+    bounds = problem.bounds
+    load, power = tau / bounds.torque, tau * qd / bounds.power
+    owned = np.concatenate([1 - load, 1 + load, 1 - power, 1 + power], axis=1)
+    kept = np.roll(point.kept[0], -1, axis=0) if knots.cyclic else point.kept[0, -len(tau) :]
+    np.testing.assert_allclose(kept, owned, atol=1e-8)
+
+    z, shape = rng.normal(size=point.kept.shape), (1, knots.count, 4)
+    flat = x.ravel()
+    gradient = differences(lambda y: motions.value(y.reshape(shape), begin)[0][0], flat)
+    np.testing.assert_allclose(point.gradient.ravel(), gradient, atol=1e-7 * np.abs(gradient).max())
+    slope = differences(lambda y: (motions.value(y.reshape(shape), begin)[2] * z).sum(), flat)
+    pull = stencils.pull(knots, point.by, z).ravel()
+    np.testing.assert_allclose(pull, slope, atol=1e-7 * np.abs(slope).max())
+
+    def lagrangian(y: Array) -> Array:
+        at = motions.differentiate(y.reshape(shape), begin)
+        return (scale * at.gradient - stencils.pull(knots, at.by, z)).ravel()
+
+    hessian = differences(lagrangian, flat)
+    more = motions.terms.curvature(x, begin, z, np.array([scale]))
+    found = dense(tuple(scale * a[0] + b[0] for a, b in zip(point.hessian, more, strict=True)), knots.cyclic)
+    np.testing.assert_allclose(found, hessian, atol=1e-7 * np.abs(hessian).max())
+
+
+@pytest.mark.parametrize("name", ["floating3r", "floating_panda"])
+def test_momentum_rows_and_their_derivatives(name: str, rng: np.random.Generator) -> None:
+    """Values beside Drake's arm; derivatives by differences."""
+    problem = prepare(composed(f"+experiment={name}", "timing.steps=3"))
+    arm, knots = problem.task.arm, Knots(problem.boundary, problem.times)
+    rows = Momentum(arm, Chain.of(arm), knots)
+    q = problem.q_init + 0.2 * rng.normal(size=(1, 4, arm.n))
+    x, begin, dt = knots.unknown(q), knots.begin(q), np.diff(problem.times)
+    tie = rows.values(x, begin)
+    right = arm.base.mean_momentum_residual(arm, q[0, :-1], np.diff(q[0], axis=0) / dt[:, None], dt)[0]
+    np.testing.assert_allclose(tie[0], right, atol=1e-12)
+    nu = rng.normal(size=tie.shape)
+
+    def pull(flat: Array) -> Array:
+        return stencils.pull(knots, rows.differentiate(flat.reshape(x.shape), begin)[1], nu).ravel()
+
+    slope = differences(lambda flat: (rows.values(flat.reshape(x.shape), begin) * nu).sum(), x.ravel())
+    np.testing.assert_allclose(pull(x.ravel()), slope, atol=1e-7 * np.abs(slope).max())
+    hessian = differences(pull, x.ravel())
+    found = dense(tuple(block[0] for block in rows.curvature(x, begin, nu)), knots.cyclic)
+    np.testing.assert_allclose(found, hessian, atol=1e-7 * np.abs(hessian).max())
 
 
 def solved(*words: str) -> tuple[Problem, Newton, Array]:
@@ -143,7 +252,7 @@ def solved(*words: str) -> tuple[Problem, Newton, Array]:
     return (
         problem,
         Solver(problem).on(problem.times),
-        Roadmap().starts(problem, problem.times, np.random.default_rng(1)),
+        Roadmap(problem, problem.times, np.random.default_rng(1)).cheapest(64),
     )
 
 
@@ -159,6 +268,55 @@ def test_ipopt_confirms_every_optimum(name: str) -> None:
         assert told.iterations <= 2
         assert told.moved < 1e-6
         assert answer.residual[s] < 1e-9
+
+
+@pytest.mark.slow
+def test_ipopt_confirms_an_optimum_beside_an_obstacle() -> None:
+    """Without the rows' curvature the last digits of the multipliers are IPOPT's to find."""
+    problem = prepare(composed("+experiment=panda_obstacle", "timing.steps=12"))
+    starts = Roadmap(problem, problem.times, np.random.default_rng(1), nodes=60).cheapest(4)
+    answer = Solver(problem).on(problem.times).solve(starts)
+    assert answer.converged.sum() >= 2
+    q = answer.q[np.flatnonzero(answer.converged)[np.argmin(answer.cost[answer.converged])]]
+    told = confirm(problem, problem.times, q, tolerance=1e-8, max_iterations=20)
+    assert told.converged
+    assert told.iterations <= 5
+    assert told.moved < 1e-6
+    assert problem.obstacles is not None
+    clearance = Clearance(problem.task.arm, problem.obstacles).smallest(q)
+    assert 0.0 <= clearance.min() - problem.obstacles.margin < 1e-3  # the obstacle is in the way; p is a smooth bound
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("words", [("base.angular_momentum=[0,0,0.02]",), ("limits=joint",)])
+def test_ipopt_confirms_optima_of_an_arm_that_floats(words: tuple[str, ...]) -> None:
+    problem = prepare(composed("+experiment=floating3r", "timing.steps=12", *words))
+    starts = Roadmap(nodes=60, most=4).starts(problem, problem.times, np.random.default_rng(1))
+    answer = Solver(problem).on(problem.times).solve(starts)
+    assert answer.converged.any()
+    q = answer.q[np.flatnonzero(answer.converged)[np.argmin(answer.cost[answer.converged])]]
+    told = confirm(problem, problem.times, q, tolerance=1e-8, max_iterations=20)
+    assert told.converged
+    assert told.iterations <= 2
+    assert told.moved < 1e-6
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["sim3", "sim4"])
+def test_ipopt_confirms_optima_of_torques(name: str) -> None:
+    """Squares of torques, and in sim4 limits of torques and powers that matter."""
+    problem = prepare(composed(f"+experiment={name}", "timing.steps=25"))
+    starts = Roadmap(problem, problem.times, np.random.default_rng(1), nodes=100).cheapest(4)
+    answer = Solver(problem).on(problem.times).solve(starts)
+    assert answer.converged.any()
+    q = answer.q[np.flatnonzero(answer.converged)[np.argmin(answer.cost[answer.converged])]]
+    told = confirm(problem, problem.times, q, tolerance=1e-8, max_iterations=20)
+    assert told.converged
+    assert told.iterations <= 4
+    assert told.moved < 1e-6
+    tau, qd = np.abs(integrals(problem, problem.times, q).tau), np.abs(velocities(problem, problem.times, q))
+    most = max((tau / problem.bounds.torque).max(), (tau * qd / problem.bounds.power).max())
+    assert most == pytest.approx({"sim3": 0.0, "sim4": 1.0}[name], abs=1e-6)
 
 
 def test_a_start_is_solved_alone_as_among_others() -> None:
@@ -177,8 +335,10 @@ def test_limits_that_nothing_keeps_are_not_kept_silently() -> None:
 
 
 def test_what_is_not_served_has_a_reason() -> None:
-    assert why_not(prepare(composed("+experiment=sim1"))) is None
-    for name, word in (("sim3", "torque"), ("panda_obstacle", "obstacles"), ("floating3r", "base")):
-        reason = why_not(replace(prepare(composed(f"+experiment={name}")), limits=None))
-        assert reason is not None
-        assert word in reason
+    for name in ("sim4", "floating3r"):
+        assert why_not(prepare(composed(f"+experiment={name}"))) is None
+    obstacle = prepare(composed("+experiment=panda_obstacle"))
+    assert why_not(replace(obstacle, limits=None)) is None
+    assert "obstacles and torques" in str(why_not(obstacle))
+    for words, word in ((("boundary=free",), "not fixed"), (("objective=base_rotation",), "rotation")):
+        assert word in str(why_not(prepare(composed("+experiment=floating3r", *words))))

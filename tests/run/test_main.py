@@ -13,7 +13,7 @@ from pipeline.config import run as config
 from pipeline.config.compose import checked
 from pipeline.problem.objective import Objective
 from pipeline.run.main import CONF
-from tests.commands import Run, assert_refused, command
+from tests.commands import Run, assert_refused, call, command
 
 # What is asked, and what the one line must name.
 REFUSED = {
@@ -190,3 +190,12 @@ def test_bad_input_as_a_process(tmp_path: Path) -> None:
     assert_refused(answer, "path.lenght", "did you mean length")
     assert answer.out == ""
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_table_that_is_given_whole_names_the_entry_that_is_not_known(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    answer = call(monkeypatch, capfd, "timing={durations:1}")
+    assert answer.error.startswith("error: timing.durations: unknown key; did you mean duration?")
+    answer = call(monkeypatch, capfd, "obstacles.shapes={ball:{kind:sphere}}")
+    assert "obstacles.shapes.ball: entries are added with a plus, as +obstacles.shapes.ball=..." in answer.error

@@ -15,10 +15,12 @@ from pipeline.common import versions
 from pipeline.common.workers import Workers
 from pipeline.config.run import RunConfig
 from pipeline.problem.problem import Problem
+from pipeline.run import resume
 from pipeline.run import run as run_module
 from tests.commands import Answer, call, command
 from tests.killed import run_and_kill
 from tests.reports import leave_out_pictures
+from tests.support import composed
 from tests.tasks import kept
 
 Sweep = Callable[..., Answer]
@@ -238,3 +240,40 @@ def test_a_killed_sweep_goes_on(sweep: Sweep, tmp_path: Path) -> None:
     for run in ("0_sim1", "1_sim1"):
         motions = [pd.read_parquet(tmp_path / name / run / "trajectories.parquet") for name in ("all", "whole")]
         pd.testing.assert_frame_equal(*motions, check_exact=True)
+
+
+SDF = "<sdf version='1.9'><model name='{name}'>{inside}</model></sdf>"
+MJCF = "<mujoco><worldbody>{inside}</worldbody></mujoco>"
+
+
+@pytest.mark.parametrize(
+    ("main", "outer", "inner", "plain"),
+    [
+        (
+            "arm.sdf",
+            SDF.format(name="arm", inside="<include><uri>model://wrist</uri></include>"),
+            SDF.format(name="wrist", inside="<include><uri>parts/hand.sdf</uri></include>"),
+            SDF.format(name="hand", inside="<link name='hand'/>"),
+        ),
+        (
+            "arm.xml",
+            MJCF.format(inside="<include file='wrist/model.sdf'/>"),
+            "<mujocoinclude><include file='parts/hand.sdf'/></mujocoinclude>",
+            "<mujocoinclude><body name='hand'/></mujocoinclude>",
+        ),
+    ],
+)
+def test_every_file_that_the_robot_is_read_from_counts(
+    main: str, outer: str, inner: str, plain: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("GZ_SIM_RESOURCE_PATH", str(tmp_path))
+    parts = {main: outer, "wrist/model.sdf": inner, "wrist/parts/hand.sdf": plain}
+    for name, text in parts.items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(text)
+    config = composed(f"robot.urdf={tmp_path / main}")
+    before = resume.inputs(config)
+    assert set(before) == {"robot.urdf", "robot.urdf: wrist/model.sdf", "robot.urdf: wrist/parts/hand.sdf"}
+    (tmp_path / "wrist/parts/hand.sdf").write_text(plain + "<!-- heavier -->")
+    after = resume.inputs(config)
+    assert {key for key in before if before[key] != after[key]} == {"robot.urdf: wrist/parts/hand.sdf"}

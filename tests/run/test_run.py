@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from pipeline.artifacts.recording.blueprint import slug
 from pipeline.artifacts.recording.recording import read_series
 from pipeline.build.problem import prepare
 from tests.commands import Answer, call, command
+from tests.once import made_once
 from tests.reports import leave_out_pictures
 from tests.support import FEW_STARTS, RUN_FILES, composed
 
@@ -32,18 +34,16 @@ def strict_json(text: str) -> dict[str, Any]:
 # --- one whole run ----------------------------------------------------------------------------------------------------
 
 
-@pytest.fixture(scope="module")
+def run_traj3(folder: Path) -> None:
+    words = ("+experiment=traj3", "seed=7", *FEW_STARTS, "parallel.workers=1", f"hydra.run.dir={folder}/own/results")
+    (folder / "own").mkdir()
+    (folder / "answer.json").write_text(json.dumps(asdict(command(*words, folder=folder / "own"))), encoding="utf-8")
+
+
+@pytest.fixture(scope="session")
 def traj3(tmp_path_factory: pytest.TempPathFactory) -> tuple[Answer, Path]:
-    folder = tmp_path_factory.mktemp("traj3")
-    answer = command(
-        "+experiment=traj3",
-        "seed=7",
-        *FEW_STARTS,
-        "parallel.workers=1",
-        f"hydra.run.dir={folder}/results",
-        folder=folder,
-    )
-    return answer, folder / "results"
+    folder = made_once(tmp_path_factory, "traj3", run_traj3)
+    return Answer(**json.loads((folder / "answer.json").read_text(encoding="utf-8"))), folder / "own" / "results"
 
 
 @pytest.mark.slow

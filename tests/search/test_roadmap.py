@@ -38,8 +38,11 @@ def test_cheapest_paths_beside_enumeration(rng: np.random.Generator) -> None:
 @pytest.mark.parametrize("name", ["sim2", "traj4", "sim5", "panda_pose"])
 def test_starts_keep_path_limits_and_boundary(name: str) -> None:
     problem = prepare(composed(f"+experiment={name}", "timing.steps=12"))
-    motions = Roadmap(nodes=100, most=16).starts(problem, problem.times, np.random.default_rng(3))
-    assert 2 <= len(motions) <= 16
+    roadmap = Roadmap(problem, problem.times, np.random.default_rng(3), nodes=100)
+    chosen, random = roadmap.cheapest(16), roadmap.random(16)
+    assert 2 <= len(chosen) <= 16
+    assert 2 <= len(random) <= 16
+    motions = np.concatenate([chosen, random])
     q = motions.reshape(-1, problem.task.arm.n)
     error = problem.task.error(q, np.tile(problem.reference.position(problem.times), (len(motions), 1)))
     assert np.abs(error).max() < 1e-6
@@ -49,8 +52,18 @@ def test_starts_keep_path_limits_and_boundary(name: str) -> None:
         assert (motions[:, 0] == problem.q_init).all()
     if problem.boundary.value == "cyclic":
         assert (motions[:, -1] == motions[:, 0]).all()
-    again = Roadmap(nodes=100, most=16).starts(problem, problem.times, np.random.default_rng(3))
-    np.testing.assert_array_equal(motions, again)
+    again = Roadmap(problem, problem.times, np.random.default_rng(3), nodes=100)
+    np.testing.assert_array_equal(motions, np.concatenate([again.cheapest(16), again.random(16)]))
+
+
+def test_random_motions_are_others_each_time() -> None:
+    problem = prepare(composed("+experiment=sim1", "timing.steps=12"))
+    roadmap = Roadmap(problem, problem.times, np.random.default_rng(3), nodes=60)
+    one, other = roadmap.random(20), roadmap.random(20)
+    assert len(one) == len(other) == 20
+    assert np.abs(one[:, None] - other[None]).max(axis=(2, 3)).min() > 1e-3
+    cheapest = roadmap.manifold.cost(problem.times, roadmap.cheapest(20)).min()
+    assert (roadmap.manifold.cost(problem.times, one) >= cheapest).all()
 
 
 def test_costs_of_edges_and_motions_are_the_objectives(rng: np.random.Generator) -> None:
@@ -77,6 +90,6 @@ def test_a_stretched_start_is_left_on_both_sides() -> None:
     """At q = 0 the planar arm is straight and its Jacobian has lost a rank along the path."""
     words = ("robot=planar3r", "robot.q_init=[0,0,0]", "path=line", "path.length=0.15", "path.direction=180")
     problem = prepare(composed(*words, "timing.duration=2", "timing.steps=16"))
-    motions = Roadmap().starts(problem, problem.times, np.random.default_rng(1))
+    motions = Roadmap(problem, problem.times, np.random.default_rng(1)).cheapest(64)
     assert (motions[:, 1] @ [0, 0, 1] > 0).any()
     assert (motions[:, 1] @ [0, 0, 1] < 0).any()

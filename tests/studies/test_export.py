@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
+from pipeline.artifacts.motion_files import save
 from pipeline.build.problem import prepare
 from pipeline.config.methods import GlobalOptions
 from pipeline.config.run import RunConfig
@@ -18,11 +21,11 @@ from pipeline.problem.limits import Limits
 from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Solution, Status, Trajectory
 from pipeline.robot.shapes import Shape
-from pipeline.studies.export import Resampled, resample, sentence, study
+from pipeline.studies.export import Nothing, Resampled, resample, sentence, study
 from pipeline.studies.study import Motions, Result
-from tests.support import composed
+from tests.support import ROOT, composed
 
-FEW = GlobalOptions(candidates=60, optimised=2)
+FEW = GlobalOptions(candidates=60, optimised=2, refine_to=None)
 Case = tuple[Problem, Evaluation]
 
 
@@ -34,6 +37,12 @@ def solved(*words: str) -> Case:
 @pytest.fixture(scope="module")
 def line() -> Case:
     return solved("path.length=0.2", "timing.duration=2", "timing.steps=20")
+
+
+@pytest.fixture(scope="module")
+def at_rest() -> Case:
+    """A free start, at which rest is the natural condition: differences begin and end there by themselves."""
+    return solved("boundary=free", "path.length=0.2", "timing.duration=2", "timing.steps=40")
 
 
 @pytest.fixture(scope="module")
@@ -118,12 +127,12 @@ def test_torques_are_judged_as_the_curve_needs_them(line: Case) -> None:
     assert motion.limit_excess["torque"] == pytest.approx(np.abs(tau).max() / 1e-3 - 1, rel=1e-6)
 
 
-def test_limits_that_are_kept_and_limits_that_are_not_there(line: Case) -> None:
-    kept = resample(limited(line, velocity=100.0), line[1], 100.0)
+def test_limits_that_are_kept_and_limits_that_are_not_there(at_rest: Case) -> None:
+    kept = resample(limited(at_rest, velocity=100.0), at_rest[1], 100.0)
     assert kept.keeps_limits
     assert sentence(kept).endswith("and meets every limit")
-    assert sentence(resample(*line, 100.0)).endswith("has no limits to check it against")
-    assert resample(*line, 100.0).tracking_error < 1e-4
+    assert sentence(resample(*at_rest, 100.0)).endswith("has no limits to check it against")
+    assert resample(*at_rest, 100.0).tracking_error < 1e-4
 
 
 # --- which motion is sent -------------------------------------------------------------------------------------------
@@ -138,6 +147,7 @@ def test_the_best_motion_is_the_cheapest_that_hits_nothing() -> None:
     """A method that promises no clearance goes through the ball: cheaper, and not to be sent."""
     ball = Shape("ball", "sphere", (0.04,), (0.69, 0.49, 0.0))
     words = ("robot=planar4r", "path.length=0.3", "path.direction=170", "timing.duration=2", "timing.steps=24")
+    words += ("boundary.rest=[start,end]", "limits.acceleration=20")
     config = composed(*words)
     free = prepare(config)
     there = replace(free, obstacles=Obstacles((ball,), 0.03))
@@ -152,9 +162,79 @@ def test_the_best_motion_is_the_cheapest_that_hits_nothing() -> None:
     nothing = sent_by(there, config, through)
     assert nothing is not None
     assert nothing.section()[0].startswith("Exported: nothing")
-    assert [nothing.columns(through), nothing.facts(), nothing.tables()] == [{}, {}, {}]
+    assert [nothing.columns(through), nothing.tables()] == [{}, {}]
+    assert list(nothing.facts()["refused"]) == ["lsv 1"]
     named = composed(*words, "export.method=lsv")
-    sent = sent_by(there, named, through, around)
-    assert isinstance(sent, Resampled)
-    assert "exceeds the clearance limit by" in sentence(sent)
+    refused = sent_by(there, named, through, around)
+    assert isinstance(refused, Nothing)
+    assert "lsv 1 exceeds the clearance limit by" in refused.section()[0]
+    forced = sent_by(there, composed(*words, "export.method=lsv", "export.force=true"), through, around)
+    assert isinstance(forced, Resampled)
+    assert "exceeds the clearance limit by" in sentence(forced)
+    assert "not to be sent as it is" in sentence(forced)
     assert sent_by(there, composed(*words, "export.method=none"), through, around) is None
+
+
+# --- what cannot be sent --------------------------------------------------------------------------------------------
+
+
+def test_a_jump_of_velocity_is_not_sent(line: Case) -> None:
+    """An optimum by differences from a given start jumps to its speed: the curve at rest would ask for an impulse."""
+    motion = resample(*line, 100.0)
+    (fault,) = motion.faults
+    jump = (line[1].q[1] - line[1].q[0]) / 0.1
+    joint = int(np.abs(jump).argmax())
+    assert fault.startswith(f"starts with a jump of velocity (joint{joint + 1} at ")
+    settings = composed("path.length=0.2", "timing.duration=2", "timing.steps=20")
+    nothing = sent_by(line[0], settings, line[1])
+    assert isinstance(nothing, Nothing)
+    said = nothing.section()[0]
+    assert "global 1 starts with a jump of velocity" in said
+    assert "boundary.rest=[start,end]" in said
+
+
+def test_a_motion_that_ends_while_it_moves_or_off_its_path_is_not_sent(at_rest: Case) -> None:
+    problem, motion = at_rest
+    assert resample(problem, motion, 100.0).faults == ()
+    moving = motion.q + 0.05 * np.linspace(0.0, 1.0, 41)[:, None] ** 3
+    faults = resample(
+        problem, evaluate(problem, Solution("lsv", Trajectory(motion.time, moving), Status.SOLVED)), 50.0
+    ).faults
+    assert len(faults) == 2
+    assert faults[0].startswith("ends while it moves (joint")
+    assert "off its path, more than path.tolerance = 0.0001 m" in faults[1]
+
+
+@pytest.mark.slow
+def test_what_is_sent_keeps_its_limits_read_back_by_pinocchio(tmp_path: Path) -> None:
+    """The file alone, by another library: torques, powers, second differences, and where the tool goes."""
+    import pinocchio
+
+    config = composed("+experiment=sim4_sendable", "timing.steps=50", "export.rate=1000")
+    problem = prepare(config)
+    motions = global_planner(problem, config.method.global_)
+    sent = study(Motions(config, problem, [evaluate(problem, one) for one in motions]))
+    assert isinstance(sent, Resampled)
+    arm = problem.task.arm.description
+    save(tmp_path, sent, arm.actuated, arm.base)
+    table, bounds = pd.read_csv(tmp_path / "motion.csv"), problem.bounds
+    q, qd, qdd = (
+        table[[f"{joint}_{kind}" for joint in arm.actuated]].to_numpy()
+        for kind in ("position", "velocity", "acceleration")
+    )
+    model = pinocchio.buildModelFromUrdf(str(ROOT / "robots" / "planar3r.urdf"))
+    model.gravity.setZero()
+    data, tip = model.createData(), model.getFrameId("tip")
+    tau, place = np.empty_like(q), np.empty((len(q), 2))
+    for i in range(len(q)):
+        tau[i] = pinocchio.rnea(model, data, q[i], qd[i], qdd[i])
+        pinocchio.framesForwardKinematics(model, data, q[i])
+        place[i] = data.oMf[tip].translation[:2]
+    np.testing.assert_allclose(qd[[0, -1]], 0.0, atol=1e-9)
+    for values, most in ((qd, bounds.velocity), (tau, bounds.torque), (tau * qd, bounds.power)):
+        assert (np.abs(values) / most).max() <= 1 + 1e-6
+    assert np.abs(tau).max() / 0.4 > 0.999, "a limit that does not bind shows nothing"
+    time = table["time"].to_numpy()
+    second = np.diff(q, 2, axis=0)[:-1] / np.diff(time)[:-2, None] ** 2
+    assert np.abs(second).max() <= np.abs(qdd).max() * (1 + 1e-6)
+    assert np.abs(place - problem.reference.position(time)).max() < 1e-4

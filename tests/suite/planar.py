@@ -19,8 +19,8 @@ from scipy.interpolate import CubicSpline
 from pipeline.build.problem import prepare
 from pipeline.common.arrays import Array
 from pipeline.common.errors import InputError
+from pipeline.methods.global_planner.grids import refinement
 from pipeline.methods.global_planner.optimum import stays_on_path
-from pipeline.methods.global_planner.planner import refinement
 from pipeline.problem.problem import Boundary, Problem
 from pipeline.program.newton.newton import WARM
 from pipeline.program.newton.serve import Solver

@@ -9,7 +9,15 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from pipeline.artifacts.figures.base import base
-from pipeline.artifacts.figures.motions import energy, joints, reference, spectral_radius, torques, tracking
+from pipeline.artifacts.figures.motions import (
+    accelerations,
+    energy,
+    joints,
+    reference,
+    spectral_radius,
+    torques,
+    tracking,
+)
 from pipeline.artifacts.figures.stroboscopic import stroboscopic
 from pipeline.artifacts.report import Report
 from pipeline.common.files import write_beside
@@ -23,6 +31,7 @@ FIGURES: dict[str, Draw] = {
     "energy": energy,
     "stroboscopic": stroboscopic,
     "joints": joints,
+    "accelerations": accelerations,
     "torques": torques,
     "spectral_radius": spectral_radius,
     "tracking": tracking,

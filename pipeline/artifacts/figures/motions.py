@@ -70,6 +70,26 @@ def joints(problem: Problem, evaluations: Sequence[Evaluation], name: str) -> Fi
     )
 
 
+def accelerations(problem: Problem, evaluations: Sequence[Evaluation], name: str) -> Figure | None:
+    """Joint accelerations with their limits, and jerks; nothing where no limit is on either."""
+    if not problem.bounds.smooth:
+        return None
+    acceleration, jerk = unit_of(problem, "rad/s$^2$", "m/s$^2$"), unit_of(problem, "rad/s$^3$", "m/s$^3$")
+    own = np.broadcast_to(problem.bounds.acceleration, problem.task.arm.n)[problem.task.arm.joints]
+
+    def rate(e: Evaluation) -> Array:
+        change = np.diff(e.qdd, axis=0) / np.diff(e.time)[:, None]
+        return np.vstack([change[:1], change])
+
+    return by_joint(
+        f"{name}: joint accelerations and jerks",
+        evaluations,
+        (rf"Acceleration $\ddot q$ [{acceleration}]", acceleration, lambda e: e.qdd),
+        (f"Jerk [{jerk}]", jerk, rate),
+        bounds=np.array([-own, own]),
+    )
+
+
 def torques(problem: Problem, evaluations: Sequence[Evaluation], name: str) -> Figure:
     """Joint torques and powers."""
     unit = unit_of(problem, "N m", "N")

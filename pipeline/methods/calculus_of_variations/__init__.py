@@ -1,1 +1,1 @@
-"""Every stationary motion of an integral of first order: extremals, and the scan for those that meet both ends."""
+"""Stationary motions of an integral of first order: extremals, and the scan for those that meet both ends."""

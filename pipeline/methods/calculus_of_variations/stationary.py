@@ -1,4 +1,4 @@
-"""Every stationary motion of the kinetic-energy integral, by the calculus of variations (r = 1, no limits).
+"""Stationary motions of the kinetic-energy integral, by the calculus of variations (r = 1, no limits).
 
 Or of any other integral of first order, L = 1/2 qd' G qd - k0 w (`problem/lagrangian.py`), G then standing for M.
 They are extremals (`extremals.py`) that also meet the condition of their ends. At a free end the momentum
@@ -12,7 +12,7 @@ and carries the residual upwards at T; the number of violations is its Morse ind
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -26,6 +26,7 @@ from pipeline.methods.method import Context, Method, Serves
 from pipeline.model.kinematics import wrap
 from pipeline.problem.lagrangian import Lagrangian
 from pipeline.problem.problem import Boundary, Problem
+from pipeline.problem.resolution import on_path
 from pipeline.problem.solution import Solution, Status, Trajectory
 from pipeline.search.self_motion import manifold, on_manifold, tangent
 
@@ -61,9 +62,11 @@ class _Family:
 
 
 def solve(problem: Problem, options: CalculusOfVariationsOptions, context: Context) -> list[Solution]:
-    """All stationary motions on problem.times, cheapest first. Their statistics: `integral`, the objective in
-    continuous time, `kind` (minimum or saddle), `index`, `unknown` [rad or rad/s] and `residual` t' M qd at T.
+    """The stationary motions that the scan finds, on the knots that their path needs, cheapest first. Their statistics:
+    `integral`, the objective in continuous time, `kind` (minimum or saddle), `index`, `unknown` [rad or rad/s] and
+    `residual` t' M qd at T.
     """
+    problem = replace(problem, times=on_path(problem))
     found: list[tuple[_Family, float]] = []
     near: list[tuple[float, float]] = []
     families = _families(problem, options)
@@ -107,6 +110,7 @@ calculus_of_variations = Method(
         boundaries=frozenset((Boundary.FIXED, Boundary.FREE)),
         constraints=False,
         moving_base=False,
+        rest=False,
     ),
     solve,
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -10,6 +11,7 @@ from scipy.interpolate import CubicSpline
 
 from pipeline.common.arrays import Array
 from pipeline.config.methods import GlobalOptions
+from pipeline.model.arm import Arm
 from pipeline.model.clearance import Clearance
 from pipeline.model.obstacles import Obstacles
 from pipeline.problem.costs import objective_values
@@ -19,6 +21,7 @@ from pipeline.problem.objective import Objective
 from pipeline.problem.problem import Problem
 from pipeline.program.feasibility import violations
 from pipeline.program.ipopt import STOPPED
+from pipeline.program.residuals import residuals
 from pipeline.program.transcription import transcribe
 
 # What a coarse grid's optimum needs to be told apart and refined; only the last grid's is reported.
@@ -58,6 +61,17 @@ class Optimum:
     solves: list[dict[str, Any]] = field(default_factory=list)
 
     @property
+    def evidence(self) -> str:
+        """What IPOPT says of it, on its last grid."""
+        told = next((solve for solve in reversed(self.solves) if "optimality" in solve), None)
+        if told is None:
+            return ""
+        return (
+            f"confirmed by IPOPT: constraints to {told['violation']:.0e}, optimality to {told['optimality']:.0e}, "
+            f"{told['iterations']} iteration{'' if told['iterations'] == 1 else 's'}"
+        )
+
+    @property
     def final(self) -> bool:
         """Whether it would come out the same again: no clock has stopped a solve that led to it."""
         return all(solve.get("status") != STOPPED for solve in self.solves)
@@ -87,16 +101,20 @@ def go_on(context: tuple[Problem, Array, GlobalOptions], first: Optimum) -> Opti
     served = not problem.objective.second_order and keeps_torque_limits(problem, times, first.q)
     if not first.converged or served:
         return first
-    guess = first.q
-    optimum = optimise(problem, times, guess, options)
-    goes_on = len(times) < len(problem.times)
-    if goes_on and _has_strayed(problem, times, guess, optimum):
-        cost = float(objective_values(problem, times, guess[None])[0])
+    return goes_on(problem, times, first, optimise(problem, times, first.q, options))
+
+
+def goes_on(problem: Problem, times: Array, first: Optimum, optimum: Optimum) -> Optimum:
+    """The optimum of the problem that was found from the first-order one's; or that, where it has strayed and a finer
+    grid is still to come.
+    """
+    if len(times) < len(problem.times) and has_strayed(problem, times, first.q, optimum):
+        cost = float(objective_values(problem, times, first.q[None])[0])
         optimum = replace(first, cost=cost, solves=optimum.solves)
     return replace(optimum, solves=first.solves + optimum.solves)
 
 
-def _has_strayed(problem: Problem, times: Array, guess: Array, optimum: Optimum) -> bool:
+def has_strayed(problem: Problem, times: Array, guess: Array, optimum: Optimum) -> bool:
     """Whether a solve ended far above a guess that keeps every limit: its first steps led into a motion with jumps,
     which coarse differences make an optimum of its own. A finer grid then starts from the guess. Accelerations must
     count for it.
@@ -160,6 +178,8 @@ def optimise(problem: Problem, times: Array, guess: Array, options: GlobalOption
         "status": outcome.status,
         "cost": cost,
     }
+    if last:
+        entry["violation"], entry["optimality"] = residuals(program.drake, outcome.result)
     return Optimum(q, cost, outcome.converged, outcome.status, solves=[entry])
 
 
@@ -171,7 +191,7 @@ def refine(context: tuple[Problem, list[Array], GlobalOptions], start: Optimum) 
         guess = CubicSpline(on, optimum.q)(fine)
         finer = _optimise_lazily(problem, fine, guess, options)
         solves += finer.solves
-        lost = not finer.converged or _has_strayed(problem, fine, guess, finer)
+        lost = not finer.converged or has_strayed(problem, fine, guess, finer)
         if not lost or fine is grids[-1]:
             optimum, on, failures = finer, fine, 0
             continue
@@ -180,15 +200,24 @@ def refine(context: tuple[Problem, list[Array], GlobalOptions], start: Optimum) 
             return replace(finer, converged=False, solves=solves)
     optimum = replace(optimum, solves=solves)
     if problem.obstacles is not None and optimum.converged:
-        optimum = _clear_between(problem, problem.obstacles, grids[-1], optimum, options)
+        optimum, _ = clear_between(
+            problem.task.arm,
+            problem.obstacles,
+            grids[-1],
+            optimum,
+            lambda q, keep_off: _optimise_lazily(problem, grids[-1], q, options, keep_off),
+        )
     return replace(optimum, continuous=stays_on_path(problem, grids[-1], optimum.q))
 
 
-def _clear_between(
-    problem: Problem, obstacles: Obstacles, times: Array, optimum: Optimum, options: GlobalOptions
-) -> Optimum:
-    """The optimum that keeps its clearance between the knots too: solved again, a little farther off at the knots."""
-    clearance = Clearance(problem.task.arm, obstacles)
+def clear_between(
+    arm: Arm, obstacles: Obstacles, times: Array, optimum: Optimum, again: Callable[[Array, float], Optimum]
+) -> tuple[Optimum, float]:
+    """The optimum that keeps its clearance between the knots too: solved again, a little farther off at the knots.
+
+    again(q, keep_off): the optimum near q that is by keep_off [m] farther off at the knots. Returns the last one too.
+    """
+    clearance = Clearance(arm, obstacles)
     fine = np.interp(np.arange(BETWEEN * (len(times) - 1) + 1) / BETWEEN, np.arange(len(times)), times)
     keep_off, solves = 0.0, list(optimum.solves)
     for _ in range(CLEARANCE_ROUNDS):
@@ -196,9 +225,9 @@ def _clear_between(
         if lacking <= 0 or not optimum.converged:
             break
         keep_off += 1.2 * lacking + 1e-7
-        optimum = _optimise_lazily(problem, times, optimum.q, options, keep_off)
+        optimum = again(optimum.q, keep_off)
         solves += optimum.solves
-    return replace(optimum, solves=solves)
+    return replace(optimum, solves=solves), keep_off
 
 
 def stays_on_path(problem: Problem, times: Array, q: Array, share: float = STAYS) -> bool:

@@ -7,6 +7,8 @@ knots by cubic splines, halving the step. What is listed are the optima found fr
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,27 +17,20 @@ from scipy.interpolate import CubicSpline
 from pipeline.common.arrays import Array
 from pipeline.config.methods import GlobalOptions
 from pipeline.methods import dynamic_programming
-from pipeline.methods.global_planner.batch import Batch
+from pipeline.methods.global_planner.basins import Basins, basins
+from pipeline.methods.global_planner.batch import JUMPS, Batch
+from pipeline.methods.global_planner.grids import coarsest, finer, on_knots, refinement
 from pipeline.methods.global_planner.optimum import Optimum, go_on, optimise_start, refine
 from pipeline.methods.global_planner.reasons import no_feasible, no_optimum, no_start
+from pipeline.methods.global_planner.smooth import freer, rough, smooth, splined, unserved
+from pipeline.methods.global_planner.starts import Starts
 from pipeline.methods.method import ANY, Context, Method
 from pipeline.model.kinematics import wrap
 from pipeline.problem.limits import LIMIT_KINDS
 from pipeline.problem.problem import Problem
+from pipeline.problem.resolution import MOST
 from pipeline.problem.solution import Solution, Status, Trajectory
 from pipeline.program.feasibility import Relaxed, least_violation
-from pipeline.search.configurations import starting_points
-from pipeline.search.population import population, ranking
-from pipeline.search.roadmap import Roadmap
-from pipeline.search.selection import distinct, diverse
-
-STARTS = {
-    "roadmap": ("roadmap",),
-    "population": ("population",),
-    "dynamic_programming": ("dynamic_programming",),
-    "both": ("population", "dynamic_programming"),
-}
-
 
 TRACKING = 1e-8  # [m] what an optimum must keep at every knot
 
@@ -52,19 +47,39 @@ STEPS = 25  # intervals of the coarsest grid: 12 miss optima
 STEPS_ALONE = 12  # where each start costs a solve of its own
 
 
+DEAREST = 3.5  # times the best: dearer optima are not refined, nor does it count that they are new
+
+
 HOPELESS = 0.1  # relative violation on a coarse grid from which on finer ones are not tried
 
 
 def solve(problem: Problem, options: GlobalOptions, context: Context) -> list[Solution]:
     """The distinct optima found from these starts, best first."""
+    if not splined(problem, options):
+        return by_differences(problem, options, context)
+    found = by_differences(rough(problem), options, context)
+    if not found[0].found and problem.constrained:
+        found = max(found, by_differences(freer(problem), options, context), key=lambda motions: motions[0].found)
+    if found[0].found:  # on the knots that the path needs
+        problem = replace(problem, times=found[0].trajectory.time)
+    return smooth(problem, found, options, context)
+
+
+def by_differences(problem: Problem, options: GlobalOptions, context: Context) -> list[Solution]:
+    """The same on the knots alone, as the papers have it."""
     why = Batch.without(problem, options)
-    grids = refinement(problem.times, options.coarse_steps or (STEPS if why is None else STEPS_ALONE))
-    motions, log = _starts(problem, grids[0], options, np.random.default_rng(context.seed))
+    times, too_coarse = on_knots(problem, options.refine_to)
+    if too_coarse:
+        return [_nothing(problem, Status.NOT_CONVERGED, too_coarse, {})]
+    asked, problem = len(problem.times) - 1, replace(problem, times=times)
+    grids = refinement(times, coarsest(problem, options.coarse_steps, STEPS if why is None else STEPS_ALONE))
+    drawn = Starts(problem, grids[0], options, np.random.default_rng(context.seed))
+    motions, log = drawn.first, drawn.log
     if not len(motions):
         return [_nothing(problem, Status.INFEASIBLE, no_start(problem, log.get("drawn", 0)), log)]
 
     batch = Batch(problem, options) if why is None else None
-    log["solver"] = "newton, confirmed by ipopt" if why is None else f"ipopt ({why})"
+    log["solver"] = f"ipopt ({why})" if batch is None else batch.words
     while True:
         starts = _optimise_starts(problem, grids[0], options, motions, batch, context)
         if any(start.converged for start in starts):
@@ -80,99 +95,128 @@ def solve(problem: Problem, options: GlobalOptions, context: Context) -> list[So
             break
         # A coarse grid can be infeasible where a finer one is not: its finite differences are other numbers.
         motions, grids = CubicSpline(grids[0], motions[:FEWER], axis=1)(grids[1]), grids[1:]
-    log["grids"] = [len(grid) - 1 for grid in grids]
+    if batch is None or not batch.cheap:  # a start costs a solve of its own: one lot of them must do
+        coarse = basins(problem, grids[0], starts, options.same_path)
+    else:
+        starts, coarse = _draw_on(problem, options, drawn, grids[0], starts, batch, context)
     log["starts"] = [
         {"converged": start.converged, "cost": start.cost, "status": start.status, "solves": start.solves}
         for start in starts
     ]
-    basins = [starts[index] for index in _basins(problem, starts, options)]
-    refined = _refine_all(problem, grids, options, basins, batch, context)
-    found = [(fine, coarse) for fine, coarse in zip(refined, basins, strict=True) if fine.converged and fine.continuous]
-    log["jumping_optima"] = sum(fine.converged and not fine.continuous for fine in refined)
+    log["barren_starts"] = coarse.barren
+    problem, grids, refined = _to_the_end(problem, grids, options, coarse.optima, batch, context)
+    log["grids"] = [len(grid) - 1 for grid in grids]
+    found = [(fine, members) for fine, members in zip(refined, coarse.members, strict=True) if _good(fine)]
+    log["jumping_optima"] = coarse.jumping + sum(fine.converged and not fine.continuous for fine in refined)
     if not found:
-        return [_nothing(problem, Status.NOT_CONVERGED, no_optimum(problem, grids[0], starts, refined), log)]
-    ranked = [found[index] for index in _distinct([fine for fine, _ in found], options, problem)]
+        why_not = no_optimum(problem, grids[0], starts, refined, coarse.jumping)
+        return [_nothing(problem, Status.NOT_CONVERGED, why_not, log)]
+    members = {id(fine): count for fine, count in found}
+    ranked = basins(problem, problem.times, [fine for fine, _ in found], options.same_path).optima
+    count = f"{len(ranked)} distinct optim{'um' if len(ranked) == 1 else 'a'} found from {len(starts)} starts"
+    words = f"{count}; the last {coarse.barren} starts brought nothing new; "
     solutions = []
-    for rank, (fine, coarse) in enumerate(ranked):
-        members = {"starts_in_basin": _members(problem, coarse, starts, options), "solves": fine.solves}
+    for rank, fine in enumerate(ranked):
+        own = {"starts_in_basin": members[id(fine)], "solves": fine.solves}
         solutions.append(
             Solution(
                 "global",
                 Trajectory(problem.times, fine.q),
                 Status.SOLVED,
+                _said(problem, asked, options, [fine.q for fine, _ in found]) if rank == 0 else "",
                 optimum=rank + 1,
                 tracking_tolerance=TRACKING,
                 limits_kept=LIMIT_KINDS,
-                statistics={**(log if rank == 0 else {}), **members},
+                knots_only=options.refine_to is None,
+                evidence=(words if rank == 0 else "") + fine.evidence,
+                statistics={**(log if rank == 0 else {}), **own},
             )
         )
     return solutions
 
 
+def finish(
+    problem: Problem, times: Array, motions: Array, options: GlobalOptions, context: Context
+) -> tuple[Array, list[Optimum]]:
+    """The distinct optima, best first, to which motions (S, N + 1, n) on the knots `times` lead, and the knots that
+    they are on: the problem's, or those that its path needs. Motions that are lost on the way are left out.
+    """
+    knots, too_coarse = on_knots(problem, options.refine_to)
+    if too_coarse:
+        return knots, []
+    problem = replace(problem, times=knots)
+    batch = Batch(problem, options) if Batch.without(problem, options) is None else None
+    grids = [times, *(grid for grid in refinement(knots, len(times)) if len(grid) > len(times))]
+    starts = _optimise_starts(problem, times, options, motions, batch, context)
+    chosen = basins(problem, times, starts, options.same_path).optima
+    problem, _, refined = _to_the_end(problem, grids, options, chosen, batch, context)
+    good = [optimum for optimum in refined if _good(optimum)]
+    return problem.times, basins(problem, problem.times, good, options.same_path).optima
+
+
 def refuses(problem: Problem, options: GlobalOptions) -> str | None:
-    """Starts by dynamic programming serve only what that method serves."""
-    if "dynamic_programming" not in STARTS[options.starts]:
+    """Starts by dynamic programming serve only what that method serves; differences know no rest."""
+    if why := unserved(problem, options):
+        return why
+    if "dynamic_programming" not in options.generators:
         return None
-    why = dynamic_programming.dynamic_programming.why_not(problem)
-    return why and f"method.global.starts = {options.starts}: {why}; starts = roadmap serves every problem"
+    why, words = dynamic_programming.dynamic_programming.why_not(rough(problem)), ", ".join(options.generators)
+    return why and f"method.global.starts = {words}: {why}; starts = roadmap serves every problem"
 
 
-global_planner = Method("global", "Global optimum", "#2F855A", GlobalOptions, ANY, solve, refuses)
+global_planner = Method("global", "Planner's optimum", "#2F855A", GlobalOptions, ANY, solve, refuses)
 
 
-def refinement(times: Array, coarse_steps: int) -> list[Array]:
-    """Grids from coarse to fine: at most coarse_steps intervals, doubled until the wanted knots `times` are reached."""
-    intervals = len(times) - 1
-    sizes = [intervals]
-    while sizes[0] > coarse_steps:
-        sizes.insert(0, max(2, sizes[0] // 2))
-    place = np.arange(intervals + 1)
-    return [np.interp(np.linspace(0, intervals, size + 1), place, times) for size in sizes]
+def _good(optimum: Optimum) -> bool:
+    return optimum.converged and optimum.continuous
 
 
-def _starts(
-    problem: Problem, coarse: Array, options: GlobalOptions, rng: np.random.Generator
-) -> tuple[Array, dict[str, Any]]:
-    """The motions (K, N + 1, n) to optimise on the coarse grid, and how they came about."""
-    parts: list[Array] = []
-    log: dict[str, Any] = {}
-    revolute = problem.task.arm.description.revolute
-    wanted = STARTS[options.starts]
-    if "roadmap" in wanted and problem.task.arm.base.count:
-        wanted = ("population",)
-        log["roadmap"] = "not for a base that moves or is held: population instead"
-    if "roadmap" in wanted:
-        paths = Roadmap(options.nodes, options.layers, options.optimised).starts(problem, coarse, rng)
-        log["roadmap_paths"] = len(paths)
-        parts.append(paths)
-        if not len(paths):  # nothing within the limits or clear of obstacles: what comes nearest is the solver's to say
-            wanted = ("population",)
-    if "population" in wanted:
-        configurations = starting_points(problem, options.configurations, rng, options.draw)
-        count = options.candidates or (len(coarse) * problem.task.arm.n) ** 2
-        motions = population(problem, coarse, configurations, count, rng)
-        log |= {"configurations": len(configurations), "drawn": count, "candidates": len(motions)}
+def _said(problem: Problem, asked: int, options: GlobalOptions, motions: list[Array]) -> str:
+    """That the grid is not the one that was asked for, and not the one that would do."""
+    count = len(problem.times) - 1
+    said = f"on {count} intervals: the {asked} of timing.steps are too few for path.tolerance" * (count > asked)
+    more = options.refine_to is not None and finer(problem, MOST, motions) is not None
+    return "; ".join(filter(None, [said, f"method.global.refine_to = {options.refine_to} allows no more" * more]))
+
+
+def _draw_on(
+    problem: Problem,
+    options: GlobalOptions,
+    drawn: Starts,
+    grid: Array,
+    starts: list[Optimum],
+    batch: Batch,
+    context: Context,
+) -> tuple[list[Optimum], Basins]:
+    """Twice as many starts and again, until the last half of them brought nothing new or the budget is spent."""
+    while True:
+        motions = drawn.further(max(0, min(len(starts), options.budget - len(starts))), grid)
         if len(motions):
-            costs = ranking(problem, coarse, motions, options.limit_weight)
-            parts.append(motions[diverse(motions, costs, options.optimised, options.same_path, revolute)])
-    if "dynamic_programming" in wanted:
-        paths = dynamic_programming.starts(problem, coarse)
-        log["dynamic_programming_paths"] = len(paths)
-        parts.append(paths)
-    empty = np.empty((0, len(coarse), problem.task.arm.n))
-    return np.concatenate(parts) if parts else empty, log
+            fresh, done = batch.coarse(grid, motions), _teller(context, len(motions), starts)
+            for count, start in enumerate(fresh, 1):
+                done(count, start)
+            starts = starts + fresh
+        found = basins(problem, grid, starts, options.same_path, jumps=JUMPS, dearest=DEAREST)
+        if not len(motions) or len(starts) >= options.budget or 2 * found.barren >= len(starts):
+            return starts, found
+
+
+def _teller(context: Context, count: int, before: Sequence[Optimum] = ()) -> Callable[[int, Optimum], None]:
+    """What tells of each of `count` starts that come after those `before`."""
+    best = min((start.cost for start in before if start.converged), default=np.inf)
+
+    def done(number: int, optimum: Optimum) -> None:
+        nonlocal best
+        best = min(best, optimum.cost) if optimum.converged else best
+        context.progress(len(before) + number, len(before) + count, best)
+
+    return done
 
 
 def _optimise_starts(
     problem: Problem, grid: Array, options: GlobalOptions, motions: Array, batch: Batch | None, context: Context
 ) -> list[Optimum]:
-    best = np.inf
-
-    def done(count: int, optimum: Optimum) -> None:
-        nonlocal best
-        best = min(best, optimum.cost) if optimum.converged else best
-        context.progress(count, len(motions), best)
-
+    done = _teller(context, len(motions))
     if batch is None:
         return context.workers.map(optimise_start, (problem, grid, options), list(motions), done)
     firsts = batch.coarse(grid, motions)
@@ -184,9 +228,13 @@ def _optimise_starts(
             done(count, first)
         return firsts
     # Where starts have come to the same motion, one of them goes on for all.
-    solved = [first for first in firsts if first.converged]
-    chosen = [solved[index] for index in _distinct(solved, options, problem)]
-    further = context.workers.map(go_on, (problem, grid, options), chosen, done)
+    chosen = basins(problem, grid, firsts, options.same_path).optima
+    served = batch.further(grid, chosen)
+    left = [first for first, optimum in zip(chosen, served, strict=True) if optimum is None]
+    others = iter(context.workers.map(go_on, (problem, grid, options), left, done))
+    further = [next(others) if optimum is None else optimum for optimum in served]
+    for count, optimum in enumerate(filter(None, served), len(left) + 1):
+        done(count, optimum)
     return [further[_nearest(problem, first, chosen)] if first.converged else first for first in firsts]
 
 
@@ -200,36 +248,36 @@ def _refine_all(
     problem: Problem,
     grids: list[Array],
     options: GlobalOptions,
-    basins: list[Optimum],
+    optima: list[Optimum],
     batch: Batch | None,
     context: Context,
 ) -> list[Optimum]:
-    """Every basin on the last grid: in one batch, and those that it does not finish one by one."""
-    alone = batch is None or problem.objective.second_order
-    refined = [None] * len(basins) if batch is None or alone else batch.refine(grids, basins)
-    left = [basin for basin, optimum in zip(basins, refined, strict=True) if optimum is None]
+    """Every optimum on the last grid: in one batch, and those that it does not finish one by one."""
+    refined = [None] * len(optima) if batch is None else batch.refine(grids, optima)
+    left = [before for before, optimum in zip(optima, refined, strict=True) if optimum is None]
     others = iter(context.workers.map(refine, (problem, grids, options), left))
     return [next(others) if optimum is None else optimum for optimum in refined]
 
 
-def _basins(problem: Problem, starts: list[Optimum], options: GlobalOptions) -> list[int]:
-    """Indices of the starts that stand for the distinct optima of the coarse grid, best first."""
-    solved = [index for index, start in enumerate(starts) if start.converged]
-    return [solved[index] for index in _distinct([starts[index] for index in solved], options, problem)]
-
-
-def _distinct(optima: list[Optimum], options: GlobalOptions, problem: Problem) -> list[int]:
-    if not optima:
-        return []
-    motions, costs = np.array([o.q for o in optima]), np.array([o.cost for o in optima])
-    return distinct(motions, costs, len(optima), options.same_path, problem.task.arm.description.revolute)
-
-
-def _members(problem: Problem, optimum: Optimum, starts: list[Optimum], options: GlobalOptions) -> int:
-    """How many starts fell into the basin of one coarse optimum."""
-    solved = [start.q - optimum.q for start in starts if start.converged]
-    revolute = problem.task.arm.description.revolute
-    return int((np.abs(wrap(np.array(solved), revolute)).max(axis=(1, 2)) <= options.same_path).sum())
+def _to_the_end(
+    problem: Problem,
+    grids: list[Array],
+    options: GlobalOptions,
+    optima: list[Optimum],
+    batch: Batch | None,
+    context: Context,
+) -> tuple[Problem, list[Array], list[Optimum]]:
+    """Every optimum on the last grid, and on finer ones while a motion leaves its path between knots; the problem is
+    then the one on these.
+    """
+    refined = _refine_all(problem, grids, options, optima, batch, context)
+    while (parted := finer(problem, options.refine_to, [fine.q for fine in refined if _good(fine)])) is not None:
+        problem, grids = replace(problem, times=parted), [*grids, parted]
+        again = [fine for fine in refined if _good(fine)]
+        batch = batch and Batch(problem, options)
+        newer = iter(_refine_all(problem, grids[-2:], options, again, batch, context))
+        refined = [next(newer) if _good(fine) else fine for fine in refined]
+    return problem, grids, refined
 
 
 def _nothing(problem: Problem, status: Status, message: str, log: dict[str, Any]) -> Solution:

@@ -43,12 +43,14 @@ def no_feasible(starts: int, relaxed: Relaxed) -> str:
     return f"no feasible motion found: {led}, and {relaxed.sentence}; ease that limit, or try {OTHERS}"
 
 
-def no_optimum(problem: Problem, grid: Array, starts: list[Optimum], refined: list[Optimum]) -> str:
-    """There are starts, on `grid`, but no optimum: why, in the solver's own words."""
+def no_optimum(problem: Problem, grid: Array, starts: list[Optimum], refined: list[Optimum], jumping: int = 0) -> str:
+    """There are starts, on `grid`, but no optimum: why, in the solver's own words. `jumping` were not refined."""
     if any(start.converged for start in starts):
         fates = {optimum.status if not optimum.converged else "jumps between branches" for optimum in refined}
+        fates |= {"jumps between branches"} if jumping else set()
+        lost = len(refined) + jumping
         return (
-            f"{len(refined)} optima of the coarse grid were lost on a finer one ({'; '.join(sorted(fates))}); "
+            f"{lost} optima of the coarse grid were lost on a finer one ({'; '.join(sorted(fates))}); "
             "try more knots (timing.steps, method.global.coarse_steps)"
         )
     words = Counter(start.status for start in starts).most_common(1)[0][0]

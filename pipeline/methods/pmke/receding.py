@@ -22,7 +22,7 @@ from scipy.interpolate import make_interp_spline
 from pipeline.common.arrays import Array
 from pipeline.config.methods import GlobalOptions, RecedingOptions
 from pipeline.methods.global_planner.planner import global_planner
-from pipeline.methods.method import ANY, Context, Method
+from pipeline.methods.method import ON_KNOTS, Context, Method
 from pipeline.methods.pmke.prediction import path_weight, rollout, solve_window, window_objective
 from pipeline.methods.singularity import singular_value_ratio
 from pipeline.model.kinematics import project
@@ -46,7 +46,7 @@ def solve(problem: Problem, options: RecedingOptions, context: Context) -> list[
     return [_follow(problem, options)]
 
 
-receding = Method("receding", "PMKE with limits", "#5B7FDB", RecedingOptions, ANY, solve)
+receding = Method("receding", "PMKE with limits", "#5B7FDB", RecedingOptions, ON_KNOTS, solve)
 
 
 def _follow(problem: Problem, options: RecedingOptions) -> Solution:
@@ -95,6 +95,7 @@ def _follow(problem: Problem, options: RecedingOptions) -> Solution:
         message,
         tracking_tolerance=TRACKING,
         limits_kept=LIMIT_KINDS,
+        grid="method.receding.prediction_step",
         statistics=statistics,
     )
 
@@ -104,7 +105,7 @@ def _first_plan(problem: Problem, objective: Objective) -> tuple[Callable[[Array
     times = np.linspace(0.0, problem.reference.duration, PLAN_INTERVALS + 1)
     whole = replace(problem, times=times, objective=objective, boundary=Boundary.FIXED)
     for starts in FIRST_STARTS:
-        first = global_planner(whole, GlobalOptions(optimised=starts))[0]
+        first = global_planner(whole, GlobalOptions(optimised=starts, budget=starts, refine_to=None))[0]
         if first.found:
             return _through(times, first.trajectory.q), ""
     return None, first.message

@@ -39,7 +39,8 @@ class Window:
         w = self.program.NewContinuousVariables(horizon * self.n, "w")
         here = proxy(self)  # what Drake is given must not keep us alive: Python sees no circle through Drake
         self._rows = DifferentiableConstraint(lambda w: here._tracking(w))
-        self.program.AddCost(DifferentiableCost(lambda w: here._energy(w)), vars=w)
+        self._cost = DifferentiableCost(lambda w: here._energy(w))
+        self.program.AddCost(self._cost, vars=w)
         self.program.AddConstraint(self._rows, lb=np.zeros(horizon * task.m), ub=np.zeros(horizon * task.m), vars=w)
 
     def solve(
@@ -47,6 +48,7 @@ class Window:
     ) -> tuple[Array, float, ipopt.Outcome, int]:
         """From q_start (n,) through x_ref (h, m), started at guess (h, n): q (h, n), objective, outcome, iterations."""
         self._rows.forget()
+        self._cost.forget()
         velocity = np.diff(np.vstack([q_start, guess]), axis=0) / self.dt
         metric = self.lagrangian.metric(guess)
         energy = 0.5 * self.dt * float(np.einsum("ki,kij,kj->", velocity, metric, velocity))

@@ -48,6 +48,7 @@ def solve(problem: Problem, options: PontryaginAsPrintedOptions, context: Contex
             Status.SOLVED,
             message,
             tracking_tolerance=options.max_drift,
+            grid="method.pontryagin_as_printed.dt",
             statistics={"steps": steps, "final_error": gap, "transversality_end": left},
         )
     ]

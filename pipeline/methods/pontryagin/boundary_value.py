@@ -22,6 +22,7 @@ from pipeline.methods.pontryagin.second_variation import morse_index
 from pipeline.model.kinematics import project, pseudoinverse
 from pipeline.problem.lagrangian import Lagrangian
 from pipeline.problem.problem import Boundary, Problem
+from pipeline.problem.resolution import on_path
 from pipeline.problem.solution import Solution, Status, Trajectory
 from pipeline.search.configurations import starting_points
 from pipeline.search.population import population, ranking
@@ -62,9 +63,10 @@ class _Extremal:
 
 
 def solve(problem: Problem, options: PontryaginOptions, context: Context) -> list[Solution]:
-    """Every extremal found, least objective first, on problem.times. Statistics: `integral`, the objective in
-    continuous time, `transversality_start` and `_end`, `kind` (minimum or saddle) and `index`.
+    """Every extremal found, least objective first, on the knots that their path needs. Statistics: `integral`, the
+    objective in continuous time, `transversality_start` and `_end`, `kind` (minimum or saddle) and `index`.
     """
+    problem = replace(problem, times=on_path(problem))
     guesses = _guesses(problem, options, np.random.default_rng(context.seed))
     best = np.inf
 

@@ -26,6 +26,7 @@ SERVES = Serves(
     constraints=False,
     orientation=False,
     moving_base=False,
+    rest=False,
 )
 
 

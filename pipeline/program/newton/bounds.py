@@ -6,7 +6,7 @@ import numpy as np
 
 from pipeline.common.arrays import Array
 from pipeline.problem.limits import Limits
-from pipeline.program.newton.knots import Knots
+from pipeline.program.newton.knots import Blocks, Knots
 
 
 class Bounds:
@@ -40,7 +40,7 @@ class Bounds:
         position, step = self._columns(z, -1.0)
         return position + self.knots.spread(step, -step)
 
-    def weigh(self, sigma: Array) -> tuple[Array, Array]:
+    def weigh(self, sigma: Array) -> Blocks:
         """C' diag(sigma) C: diagonal entries of the blocks on (S, U, n) and above (S, pairs, n) the diagonal."""
         position, step = self._columns(sigma, 1.0)
         return position + self.knots.spread(step, step), -self.knots.between(step)

@@ -14,6 +14,8 @@ import numpy as np
 from pipeline.common.arrays import Array
 from pipeline.problem.problem import Boundary
 
+Blocks = tuple[Array, ...]  # of a symmetric matrix: (S, U, n, n) on its diagonal, and those 1, 2, .. above it
+
 
 class Knots:
     """The unknown knots of motions on the grid `times` (N + 1,).
@@ -51,30 +53,58 @@ class Knots:
         first = begin if self.fixed else x[:, -1:] - begin if self.cyclic else x[:, :1]
         return x - np.concatenate([first, x[:, :-1]], axis=1)
 
-    def spread(self, at_end: Array, at_begin: Array) -> Array:
-        """The sum (S, U, ...) of parts of owned intervals at their ends and at their beginnings."""
+    def before(self, values: Array, places: int) -> Array:
+        """Of every knot what stands so many places before it; zero where that is before the first unknown."""
         if self.cyclic:
-            return at_end + np.roll(at_begin, -1, axis=1)
-        total: Array = at_end.copy()
-        total[:, :-1] += at_begin[:, 1:]
-        return total
-
-    def between(self, blocks: Array) -> Array:
-        """Blocks (S, U, ...) of owned intervals' ends: couplings of knots k and k + 1 (in a cycle the last and 0)."""
-        return np.roll(blocks, -1, axis=1) if self.cyclic else blocks[:, 1:]
-
-    def product(self, diagonal: Array, off: Array, d: Array) -> Array:
-        """H d (S, U, n) of a symmetric matrix with these diagonal and upper blocks."""
-        out: Array = (diagonal @ d[..., None])[..., 0]
-        pairs = off.shape[1]
-        out[:, :pairs] += (off @ np.roll(d, -1, axis=1)[:, :pairs, :, None])[..., 0]
-        back = (off.swapaxes(-1, -2) @ d[:, :pairs, :, None])[..., 0]
-        if self.cyclic:
-            return out + np.roll(back, 1, axis=1)
-        out[:, 1:] += back
+            return np.roll(values, places, axis=1)
+        out = np.zeros_like(values)
+        out[:, places:] = values[:, : values.shape[1] - places]
         return out
 
-    def reduce(self, Z: Array, diagonal: Array, off: Array) -> tuple[Array, Array]:
+    def after(self, values: Array, places: int) -> Array:
+        """The transpose of `before`: what belongs to the knot so many places after."""
+        if self.cyclic:
+            return np.roll(values, -places, axis=1)
+        if not places:
+            return values
+        out = np.zeros_like(values)
+        out[:, : values.shape[1] - places] = values[:, places:]
+        return out
+
+    def pairs(self, blocks: Array, places: int, apart: int) -> Array:
+        """Couplings of knots k and k + apart (S, pairs, ...), in a cycle round its end: of owners `places` after k."""
+        return self.after(blocks, places)[:, : self.pairs_of(apart)]
+
+    def pairs_of(self, apart: int) -> int:
+        """How many knots have one that is so far on."""
+        return self.count if self.cyclic else max(self.count - apart, 0)
+
+    def spread(self, at_end: Array, at_begin: Array) -> Array:
+        """The sum (S, U, ...) of parts of owned intervals at their ends and at their beginnings."""
+        return np.asarray(at_end + self.after(at_begin, 1))
+
+    def between(self, blocks: Array) -> Array:
+        """Blocks (S, U, ...) of owned intervals: couplings of the knots k and k + 1."""
+        return self.pairs(blocks, 1, 1)
+
+    def product(self, blocks: Blocks, d: Array) -> Array:
+        """H d (S, U, n) of a symmetric matrix: its blocks on the diagonal, and those 1, 2, .. above."""
+        out: Array = (blocks[0] @ d[..., None])[..., 0]
+        for apart, off in enumerate(blocks[1:], 1):
+            pairs = off.shape[1]
+            out[:, :pairs] += (off @ np.roll(d, -apart, axis=1)[:, :pairs, :, None])[..., 0]
+            back = (off.swapaxes(-1, -2) @ d[:, :pairs, :, None])[..., 0]
+            if self.cyclic:
+                out += np.roll(back, apart, axis=1)
+            else:
+                out[:, apart:] += back
+        return out
+
+    def reduce(self, Z: Array, blocks: Blocks) -> Blocks:
         """Z'HZ by blocks, for bases Z (S, U, n, r)."""
-        transposed, pairs = Z.swapaxes(-1, -2), off.shape[1]
-        return transposed @ diagonal @ Z, transposed[:, :pairs] @ off @ np.roll(Z, -1, axis=1)[:, :pairs]
+        transposed = Z.swapaxes(-1, -2)
+        apart = [
+            transposed[:, : off.shape[1]] @ off @ np.roll(Z, -j, axis=1)[:, : off.shape[1]]
+            for j, off in enumerate(blocks[1:], 1)
+        ]
+        return (transposed @ blocks[0] @ Z, *apart)

@@ -7,7 +7,7 @@ Each iteration serves all starts and all knots with one call of the kernel.
    is left is Z'HZ, N r unknowns in a narrow band (Nocedal and Wright 2006, Section 18.3), solved by Cholesky. Where it
    is not positive definite it fades into the stiffness M/dt, which always is;
 3. limits c >= 0 by a primal-dual interior point (Nocedal and Wright, chapter 19) with slacks s and, so that a start
-   beyond its limits is none the worse, an excess t that costs PENALTY each: c + t = s, z s = mu, (PENALTY - z) t = mu.
+   beyond its limits is none the worse, an excess t that costs a penalty p each: c + t = s, z s = mu, (p - z) t = mu.
    All this is diagonal: the band stays. Where an excess remains, no motion near the start keeps the limits;
 4. full steps are the rule; others are searched with the filter of Waechter and Biegler (2006), each trial bent back
    onto the path (a second-order correction);
@@ -25,9 +25,11 @@ from numpy.typing import NDArray
 
 from pipeline.common.arrays import Array
 from pipeline.problem.limits import Limits
-from pipeline.program.newton import triangular
+from pipeline.program.newton import stencils, triangular
 from pipeline.program.newton.banded import Banded
 from pipeline.program.newton.bounds import Bounds
+from pipeline.program.newton.inequalities import Inequalities
+from pipeline.program.newton.knots import Blocks
 from pipeline.program.newton.motion import Motions, PerStart, Point
 
 FILTER = 16  # entries of each start's filter
@@ -37,7 +39,7 @@ ON_PATH = 1e-5  # [m, rad] from where the last step is taken
 BARRIER_END = 1e-10
 COMPLEMENTARITY = 10.0  # times BARRIER_END: how far products of slack and multiplier may be from it
 FEASIBLE = 1e-9
-PENALTY = 1e3  # of an excess [rad], in units of the start's cost: multipliers of limits that can be kept are smaller
+
 BEYOND = 1e-6  # [rad] of excess that remains: infeasible
 SHORT, PATIENCE = 1e-3, 3  # more than so many steps shorter than this: lost
 TRIALS = 10
@@ -80,6 +82,7 @@ class State(PerStart):
     excess: Array
     z: Array
     mu: Array
+    nu: Array
     seen_theta: Array
     seen_phi: Array
     short: NDArray[np.int_]
@@ -102,6 +105,7 @@ class Step(PerStart):
     slack: Array
     excess: Array
     z: Array
+    nu: Array
     decrement: Array
     slope: Array
     theta: Array
@@ -113,8 +117,8 @@ class Newton:
 
     def __init__(self, motions: Motions, limits: Limits) -> None:
         self.motions, self.knots = motions, motions.knots
-        self.bounds = Bounds(self.knots, limits)
-        self.band = Banded(self.knots.count, motions.n - motions.m, self.knots.cyclic)
+        self.limits = Inequalities(Bounds(self.knots, limits), motions.terms.count, motions.terms.penalty)
+        self.band = Banded(self.knots.count, motions.n - motions.m, self.knots.cyclic, motions.reach)
 
     def solve(self, q: Array, barrier: Barrier = COLD, *, tolerance: float = 1e-10, max_iterations: int = 60) -> Answer:
         """From motions q (S, N + 1, n); never raises for a start that fails."""
@@ -144,7 +148,7 @@ class Newton:
                 who = state.number[finished]
                 answer.q[who] = self.knots.whole(state.x, state.begin)[finished]
                 answer.cost[who], answer.iterations[who] = state.point.cost[finished], iteration
-                answer.residual[who] = np.abs(state.point.error[finished]).max(axis=(1, 2))
+                answer.residual[who] = self._missed(state.point)[finished]
                 answer.converged[who] = (done & ~lost)[finished]
                 if finished.all():
                     break
@@ -153,10 +157,10 @@ class Newton:
 
     def _begin(self, q: Array, barrier: Barrier) -> State:
         count, begin, x = len(q), self.knots.begin(q), self.knots.unknown(q)
-        kept, mu = self.bounds.values(x, begin), np.full(count, barrier.mu if self.bounds else 0.0)
-        slack = np.maximum(kept, barrier.push * self.bounds.width)
-        z = np.minimum(mu[:, None] / slack, PENALTY / 2)
         point = self.motions.differentiate(x, begin)
+        kept, mu = self.limits.values(x, begin, point.kept), np.full(count, barrier.mu if self.limits else 0.0)
+        slack = np.maximum(kept, barrier.push * self.limits.width)
+        z = np.minimum(mu[:, None] / slack, self.limits.penalty / 2)
         empty = np.full((count, FILTER), np.inf)
         return State(
             number=np.arange(count),
@@ -164,9 +168,10 @@ class Newton:
             begin=begin,
             scale=1.0 / np.maximum(point.cost, triangular.TINY),
             slack=slack,
-            excess=np.maximum(slack - kept, mu[:, None] / (PENALTY - z)),
+            excess=np.maximum(slack - kept, mu[:, None] / (self.limits.penalty - z)),
             z=z,
             mu=mu,
+            nu=np.zeros_like(point.tie),
             seen_theta=empty,
             seen_phi=empty.copy(),
             short=np.zeros(count, int),
@@ -176,71 +181,84 @@ class Newton:
     # --- the direction ------------------------------------------------------------------------------------------
 
     def _direction(self, state: State) -> Step:
-        point, bounds, knots = state.point, self.bounds, self.knots
+        point, limits, knots, ties = state.point, self.limits, self.knots, self.motions.ties
         scale, mu = state.scale[:, None, None], state.mu[:, None]
         YT, ZT = point.Y.swapaxes(-1, -2), point.Z.swapaxes(-1, -2)
         gradient = point.gradient * scale
-        lack = self._lack(state) if bounds else state.slack
-        towards = gradient - bounds.pull(state.z) if bounds else gradient
+        lack = self._lack(state) if limits else state.slack
+        towards = gradient - limits.pull(point.by, state.z) if limits else gradient
+        if ties.count:
+            towards = towards + stencils.pull(knots, point.tied, state.nu)
         multipliers = triangular.backward(point.R, -(YT @ towards[..., None])[..., 0])
-        diagonal = point.diagonal * scale[..., None] + self.motions.curvature(point, multipliers)
-        off, stiff, stiff_off = (a * scale[..., None] for a in (point.off, point.stiff, point.stiff_off))
+        hessian, stiff = (tuple(a * scale[..., None] for a in blocks) for blocks in (point.hessian, point.stiff))
+        hessian[0][:] += self.motions.curvature(point, multipliers)
+        more = self.motions.terms.curvature(state.x, state.begin, limits.of_rows(state.z), state.scale)
+        for bends in (more, ties.curvature(state.x, state.begin, state.nu)):
+            for block, bent in zip(hessian, bends, strict=False):
+                block[:] += bent
         driven = gradient
-        if bounds:
-            other = PENALTY - state.z
+        if limits:
+            other = limits.penalty - state.z
             sigma = 1 / (state.slack / state.z + state.excess / other)
             off_centre = lack - mu / state.z + state.slack + mu / other - state.excess
-            on, above = bounds.weigh(sigma)
-            joint = np.arange(self.motions.n)
-            diagonal[..., joint, joint] += on
-            stiff[..., joint, joint] += on
-            off[..., joint, joint] += above
-            stiff_off[..., joint, joint] += above
-            driven = gradient - bounds.pull(state.z - sigma * off_centre)
+            limits.add(point.by, sigma, hessian, stiff)
+            driven = gradient - limits.pull(point.by, state.z - sigma * off_centre)
         onto = -(point.Y @ triangular.forward(point.R, point.error)[..., None])[..., 0]
-        right = -(ZT @ (driven + knots.product(diagonal, off, onto))[..., None])[..., 0]
-        within = self._reduced(point.Z, (diagonal, off), (stiff, stiff_off), right)
+        right = -(ZT @ (driven + knots.product(hessian, onto))[..., None])[..., 0]
+        within, nu, pulled = self._reduced(point, hessian, stiff, right, onto)
         d = onto + (point.Z @ within[..., None])[..., 0]
-        theta = np.abs(point.error).sum(axis=(1, 2))
+        theta = np.abs(point.error).sum(axis=(1, 2)) + np.abs(point.tie).sum(axis=(1, 2))
         slope, phi = (gradient * d).sum(axis=(1, 2)), point.cost * state.scale
         slack_step = excess_step = z_step = state.slack
-        if bounds:
-            z_step = -sigma * (bounds.change(d) + off_centre)
+        if limits:
+            z_step = -sigma * (limits.change(point.by, d) + off_centre)
             slack_step = (mu - state.slack * z_step) / state.z - state.slack
             excess_step = (mu + state.excess * z_step) / other - state.excess
             theta = theta + np.abs(lack).sum(axis=1)
             phi = phi + self._barrier(state.slack, state.excess, state.mu)
             slope = slope - state.mu * (slack_step / state.slack + excess_step / state.excess).sum(axis=1)
-            slope = slope + PENALTY * excess_step.sum(axis=1)
-        decrement = np.abs((right * within).sum(axis=(1, 2)))
-        return Step(d, slack_step, excess_step, z_step, decrement, slope, theta, phi)
+            slope = slope + excess_step @ limits.penalty
+        decrement = np.abs(((right - pulled) * within).sum(axis=(1, 2)))
+        return Step(d, slack_step, excess_step, z_step, nu, decrement, slope, theta, phi)
 
     def _lack(self, state: State) -> Array:
-        return self.bounds.values(state.x, state.begin) + state.excess - state.slack
+        return self.limits.values(state.x, state.begin, state.point.kept) + state.excess - state.slack
 
-    @staticmethod
-    def _barrier(slack: Array, excess: Array, mu: Array) -> Array:
-        return np.asarray(PENALTY * excess.sum(axis=1) - mu * (np.log(slack) + np.log(excess)).sum(axis=1))
+    def _barrier(self, slack: Array, excess: Array, mu: Array) -> Array:
+        return np.asarray(excess @ self.limits.penalty - mu * (np.log(slack) + np.log(excess)).sum(axis=1))
 
-    def _reduced(self, Z: Array, blocks: tuple[Array, Array], stiff: tuple[Array, Array], right: Array) -> Array:
-        """The step (S, U, r) in the null spaces."""
-        matrices = self.band.assemble(*self.knots.reduce(Z, *blocks))
-        positive = self.band.assemble(*self.knots.reduce(Z, *stiff))
+    def _reduced(self, point: Point, blocks: Blocks, stiff: Blocks, right: Array, onto: Array) -> tuple[Array, ...]:
+        """The step (S, U, r) in the null spaces, the ties' multipliers (S, U, T) and their pull on it (S, U, r)."""
+        matrices = self.band.assemble(self.knots.reduce(point.Z, blocks))
+        positive = self.band.assemble(self.knots.reduce(point.Z, stiff))
         # Where nothing holds the start, a uniform motion costs the stiffness nothing.
         positive[:, :, -1] += 1e-4 * positive[:, :, -1].mean(axis=1, keepdims=True)
-        return self.band.solve(matrices, positive, right)[0]
+        if not self.motions.ties.count:
+            within = self.band.solve(matrices, positive, right)[0]
+            return within, point.tie, np.zeros(())
+        target = -(point.tie + stencils.change(self.knots, point.tied, onto))
+        reduced = tuple(g @ self.knots.before(point.Z, s) for s, g in enumerate(point.tied))
+        rows = stencils.dense(self.knots, reduced)
+        within, nu, _ = self.band.solve(matrices, positive, right, rows, target.reshape(len(right), -1))
+        nu = nu.reshape(point.tie.shape)
+        return within, nu, stencils.pull(self.knots, reduced, nu)
 
     def _converged(self, state: State, step: Step, tolerance: float) -> NDArray[np.bool_]:
-        done = (step.decrement < tolerance) & (np.abs(state.point.error).max(axis=(1, 2)) < ON_PATH)
-        if self.bounds:
+        done = (step.decrement < tolerance) & (self._missed(state.point) < ON_PATH)
+        if self.limits:
             gap = np.abs(state.slack * state.z - state.mu[:, None]).max(axis=1)
             lack = np.maximum(np.abs(self._lack(state)), state.excess).max(axis=1)
             done &= (gap < COMPLEMENTARITY * BARRIER_END) & (state.mu <= BARRIER_END) & (lack < FEASIBLE)
         return done
 
+    @staticmethod
+    def _missed(point: Point) -> Array:
+        """The largest error (S,) of the path and of ties."""
+        return np.maximum(np.abs(point.error).max(axis=(1, 2)), np.abs(point.tie).max(axis=(1, 2), initial=0.0))
+
     def _infeasible(self, state: State, step: Step, tolerance: float) -> NDArray[np.bool_]:
         beyond = state.excess.max(axis=1, initial=0.0) > BEYOND
-        return (step.decrement < tolerance) & (state.mu <= BARRIER_END) & beyond if self.bounds else beyond
+        return (step.decrement < tolerance) & (state.mu <= BARRIER_END) & beyond if self.limits else beyond
 
     # --- the step -----------------------------------------------------------------------------------------------
 
@@ -248,7 +266,7 @@ class Newton:
         """The next iterate. The whole next point is computed at once, since full steps are the rule."""
         towards = np.maximum(0.99, 1 - state.mu)
         reach = np.ones(len(state.x))
-        if self.bounds:
+        if self.limits:
             reach = np.minimum(
                 _fraction(state.slack, step.slack, towards), _fraction(state.excess, step.excess, towards)
             )
@@ -256,7 +274,7 @@ class Newton:
         alpha = np.where(np.isfinite(alpha), alpha, 0.0)
         trial = state.x + alpha[:, None, None] * step.d
         point = self.motions.differentiate(trial, state.begin)
-        refused = self._refused(state, step, alpha, trial, point.cost, point.error) & ~last
+        refused = self._refused(state, step, alpha, trial, point.cost, point.error, point.kept, point.tie) & ~last
         searched = bad = np.flatnonzero(refused)
         for _ in range(TRIALS):
             if not len(bad):
@@ -272,31 +290,39 @@ class Newton:
         if len(searched):
             point.put(searched, self.motions.differentiate(trial[searched], state.begin[searched]))
         slack, excess, z, mu = state.slack, state.excess, state.z, state.mu
+        nu = state.nu + alpha[:, None, None] * (step.nu - state.nu)
         theta, phi = state.seen_theta, state.seen_phi
         oldest = np.where(step.theta > FEASIBLE, step.theta, np.inf)
         theta, phi = np.roll(theta, 1, axis=1), np.roll(phi, 1, axis=1)
         theta[:, 0], phi[:, 0] = oldest, step.phi
-        if self.bounds:
+        if self.limits:
             slack, excess = slack + alpha[:, None] * step.slack, excess + alpha[:, None] * step.excess
-            dual = np.minimum(_fraction(z, step.z, towards), _fraction(PENALTY - z, -step.z, towards))
+            dual = np.minimum(_fraction(z, step.z, towards), _fraction(self.limits.penalty - z, -step.z, towards))
             z = z + dual[:, None] * step.z
             # complementarity within a factor of its target (Waechter and Biegler, eq. (16))
-            z = np.clip(z, 1e-10 * mu[:, None] / slack, np.minimum(1e10 * mu[:, None] / slack, (1 - 1e-12) * PENALTY))
-            near = np.abs(state.point.error).max(axis=(1, 2)) < 1e-4
+            z = np.clip(
+                z,
+                1e-10 * mu[:, None] / slack,
+                np.minimum(1e10 * mu[:, None] / slack, (1 - 1e-12) * self.limits.penalty),
+            )
+            near = self._missed(state.point) < 1e-4
             solved = (step.decrement < 10 * mu) & near & (alpha > 0.3)
             mu = np.where(solved, np.maximum(BARRIER_END, np.minimum(0.1 * mu, mu**1.7)), mu)
             theta[mu < state.mu] = np.inf  # another barrier, another filter
         short = np.where(alpha < SHORT, state.short + 1, 0)
-        return State(state.number, trial, state.begin, state.scale, slack, excess, z, mu, theta, phi, short, point)
+        return State(state.number, trial, state.begin, state.scale, slack, excess, z, mu, nu, theta, phi, short, point)
 
-    def _refused(self, state: State, step: Step, alpha: Array, trial: Array, cost: Array, error: Array) -> NDArray[Any]:
+    def _refused(
+        self, state: State, step: Step, alpha: Array, trial: Array, cost: Array, error: Array, *others: Array
+    ) -> NDArray[Any]:
         """Whether a trial neither lowers cost nor what is missed, against the iterate and against its filter."""
-        theta, phi = np.abs(error).sum(axis=(1, 2)), cost * state.scale
-        if self.bounds:
+        kept, tie = others
+        theta, phi = np.abs(error).sum(axis=(1, 2)) + np.abs(tie).sum(axis=(1, 2)), cost * state.scale
+        if self.limits:
             slack, excess = (
                 a + alpha[:, None] * b for a, b in ((state.slack, step.slack), (state.excess, step.excess))
             )
-            theta = theta + np.abs(self.bounds.values(trial, state.begin) + excess - slack).sum(axis=1)
+            theta = theta + np.abs(self.limits.values(trial, state.begin, kept) + excess - slack).sum(axis=1)
             phi = phi + self._barrier(slack, excess, state.mu)
         rounding = 1e-10 * np.maximum(1.0, np.abs(step.phi))
         descent = (step.slope < 0) & (step.theta < 1e-4) & (theta < 1e-4)

@@ -5,34 +5,58 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.common.arrays import Array
+from pipeline.model.clearance import Clearance
 from pipeline.model.kernel.chain import Chain
-from pipeline.problem.problem import Problem
+from pipeline.problem.problem import Boundary, Problem
+from pipeline.program.newton.clear import Clear
+from pipeline.program.newton.forces import Forces
 from pipeline.program.newton.knots import Knots
-from pipeline.program.newton.motion import Motions
+from pipeline.program.newton.momentum import LOOSE, Momentum, Ties
+from pipeline.program.newton.motion import NOTHING, Motions, Terms
 from pipeline.program.newton.newton import Newton
 
-FEWEST = 4  # intervals: a shorter cycle does not fold
+SERVED = ("kinetic_energy", "velocity_norm", "torque")
+FEWEST = {False: 4, True: 6}  # knots, without and with torques: a shorter cycle does not fold
 
 
 def why_not(problem: Problem) -> str | None:
     """What Newton's method does not serve in `problem`, for the log; None: it serves it whole.
 
-    Served are the kinetic energy and the velocity norm of an arm on a base that stands, on positions and poses, with
-    any boundary, within limits of positions and velocities.
+    Served are the kinetic energy, the velocity norm and the torques of an arm on a base that stands, on positions and
+    poses, with any boundary, within limits of positions, velocities, torques and powers, or clear of obstacles.
     """
-    objective, bounds = problem.objective, problem.bounds
+    objective = problem.objective
     reasons = {
-        "a base that moves or is held": problem.task.arm.base.count > 0,
-        "torques or reactions in the objective": objective.second_order,
+        **_about_base(problem),
+        "reactions in the objective": objective.second_order and not objective.weight("torque"),
         "a secondary criterion": objective.secondary is not None,
-        "no velocity in the objective": not objective.weight("kinetic_energy")
-        and not objective.weight("velocity_norm"),
+        "neither velocities nor torques in the objective": not any(map(objective.weight, SERVED)),
+        "rest, or limits of accelerations or jerks": any(problem.rest) or problem.bounds.smooth,
         "bounds on integrals": bool(problem.bounds_of_integrals),
-        "torque or power limits": bool(np.isfinite(bounds.torque).any() or np.isfinite(bounds.power).any()),
-        "obstacles": problem.obstacles is not None,
-        "so few intervals": len(problem.times) <= FEWEST,
+        "obstacles and torques at once": problem.obstacles is not None and _torques(problem),
+        "so few intervals": len(problem.times) <= FEWEST[_torques(problem)],
     }
     return next((reason for reason, holds in reasons.items() if holds), None)
+
+
+def _about_base(problem: Problem) -> dict[str, bool]:
+    """What is not served of an arm whose base has coordinates: its momentum from a given start is."""
+    base, objective = problem.task.arm.base, problem.objective
+    moves = base.count > 0
+    return {
+        "a base that is held": base.kind == "held",
+        "a base that moves, from a start that is not fixed": moves and problem.boundary is not Boundary.FIXED,
+        "a base that moves, and its rotation": moves and objective.weight("base_rotation") > 0,
+        "a base that moves, and torques": moves and _torques(problem),
+        "a base that moves, and limits of its attitude": moves and bool(np.isfinite(problem.bounds.attitude)),
+        "a base that moves, and velocities without energy": moves and not objective.weight("kinetic_energy"),
+    }
+
+
+def _torques(problem: Problem) -> bool:
+    """Whether torques count."""
+    bounds = problem.bounds
+    return problem.objective.second_order or bool(np.isfinite([bounds.torque, bounds.power]).any())
 
 
 class Solver:
@@ -40,9 +64,21 @@ class Solver:
 
     def __init__(self, problem: Problem) -> None:
         self.problem, self.chain = problem, Chain.of(problem.task.arm)
+        obstacles = problem.obstacles
+        self.clearance = None if obstacles is None else Clearance(problem.task.arm, obstacles)
 
-    def on(self, times: Array) -> Newton:
-        """For motions on the knots `times` (N + 1,)."""
+    def on(self, times: Array, keep_off: float = 0.0) -> Newton:
+        """For motions on the knots `times` (N + 1,), by keep_off [m] more than the margin off all obstacles."""
         problem, knots = self.problem, Knots(self.problem.boundary, times)
         x_ref = problem.reference.position(times)
-        return Newton(Motions(self.chain, problem.task, problem.objective, knots, x_ref), problem.bounds)
+        terms: Terms = NOTHING
+        if self.clearance is not None:
+            terms = Clear(self.clearance.rows(keep_off))
+        elif _torques(problem):
+            terms = Forces(self.chain, problem, knots)
+        arm = problem.task.arm
+        ties: Ties = LOOSE
+        if arm.base.kind == "floating":
+            ties = Momentum(arm, self.chain, knots)
+        motions = Motions(self.chain, problem.task, problem.objective, knots, x_ref, terms, ties)
+        return Newton(motions, problem.bounds)

@@ -9,13 +9,13 @@ import numpy as np
 from pipeline.common.arrays import Array
 from pipeline.model.base import Base
 from pipeline.program.differentiable import DifferentiableConstraint
-from pipeline.program.program import Block, Program, Rate, blocks
+from pipeline.program.program import Block, Lifted, Program, Rate, blocks
 from pipeline.program.scaling import POSITION_SCALE
 
 DEPENDENT = 1e-6  # relative: a singular value below it is zero
 
 
-def comes_back(program: Program) -> bool:
+def comes_back(program: Lifted) -> bool:
     """Whether closed joints bring the end effector back, but for turns about a centre of mass that rests (`close`)."""
     return program.arm.base.after_cycle(program.arm, program.guess.q[-1]) is not None
 

@@ -7,11 +7,11 @@ import numpy as np
 from pipeline.common.arrays import Array
 from pipeline.model.clearance import Clearance
 from pipeline.program.differentiable import DifferentiableConstraint
-from pipeline.program.program import Program, blocks
+from pipeline.program.program import Lifted, blocks
 from pipeline.program.scaling import POSITION_SCALE
 
 
-def keep(program: Program) -> None:
+def keep(program: Lifted) -> None:
     """By Drake's smooth penalty at every knot: at most 1 (`model/clearance.py`)."""
     if program.problem.obstacles is None:
         return

@@ -7,7 +7,7 @@ import scipy.sparse as sp
 
 from pipeline.problem.problem import Boundary
 from pipeline.problem.turns import full_turns
-from pipeline.program.program import Program
+from pipeline.program.program import Lifted, Program
 from pipeline.program.scaling import POSITION_SCALE
 
 
@@ -22,7 +22,7 @@ def link(program: Program) -> None:
     program.drake.AddLinearEqualityConstraint(rows, np.zeros(count * n), unknowns)
 
 
-def bound(program: Program) -> None:
+def bound(program: Lifted) -> None:
     """q(0) given, or q(T) = q(0) up to the full turns of the guess; a base starts where it is, a held one stays."""
     start, nb = POSITION_SCALE * program.problem.q_init, program.nb
     if program.problem.boundary is Boundary.FIXED:

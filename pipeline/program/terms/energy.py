@@ -13,22 +13,22 @@ import numpy as np
 from pipeline.common.arrays import Array
 from pipeline.problem.lagrangian import trapezoid_weights
 from pipeline.program.differentiable import DifferentiableCost
-from pipeline.program.program import Block, Program, Rate, blocks
+from pipeline.program.program import Block, Lifted, Rate, blocks
 from pipeline.program.scaling import POSITION_SCALE
 
 
-def quadratic(program: Program) -> None:
-    """The sum of 1/2 qd_i' G(q_i) qd_i dt_i."""
+def quadratic(program: Lifted) -> None:
+    """The sum of 1/2 qd_i' G(q_i) qd_i dt_i, or of what stands for the dt_i at other stations."""
     if not program.lagrangian.is_quadratic or program.elastic:
         return
-    for block in blocks(0, program.intervals):
-        unknowns = np.concatenate([program.y[block + 1].ravel(), program.w[block].ravel()])
-        weight = program.dt[block] / program.scaling.cost
+    for block in blocks(0, len(program.weights)):
+        unknowns = np.concatenate([program.stations[block].ravel(), program.w[block].ravel()])
+        weight = program.weights[block] / program.scaling.cost
         energy = weighted_sum(program, program.lagrangian.quadratic_gradient, block, weight)
         program.drake.AddCost(DifferentiableCost(energy), vars=unknowns)
 
 
-def weighted_sum(program: Program, rate: Rate, block: Block, weight: Array) -> Callable[[Array], tuple[float, Array]]:
+def weighted_sum(program: Lifted, rate: Rate, block: Block, weight: Array) -> Callable[[Array], tuple[float, Array]]:
     """The sum of weight_i T_i over a block, by (y, w), for T (K,) with its gradients by q and qd."""
     shape, to_velocity = (len(block), program.n), program.scaling.to_velocity[block]
     split = len(block) * program.n
@@ -44,7 +44,7 @@ def weighted_sum(program: Program, rate: Rate, block: Block, weight: Array) -> C
     return energy
 
 
-def secondary(program: Program) -> None:
+def secondary(program: Lifted) -> None:
     """-k0 w(q_i) with the trapezoidal rule's weights."""
     if program.problem.objective.secondary is None or program.elastic:
         return
@@ -52,7 +52,7 @@ def secondary(program: Program) -> None:
         _secondary(program, knots)
 
 
-def _secondary(program: Program, knots: Block) -> None:
+def _secondary(program: Lifted, knots: Block) -> None:
     weight = trapezoid_weights(program.times)[knots] / program.scaling.cost
 
     def loss(x: Array) -> tuple[float, Array]:

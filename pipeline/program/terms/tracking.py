@@ -5,19 +5,19 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.common.arrays import Array
-from pipeline.program.program import Block, Program, blocks
+from pipeline.program.program import Block, Lifted, blocks
 from pipeline.program.scaling import POSITION_SCALE
 from pipeline.program.terms import base
 
 
-def follow(program: Program) -> None:
+def follow(program: Lifted) -> None:
     """x(q_i) = x_ref,i, and for poses R(q_i) = R_ref,i; not at a start that is given, nor where closed joints do it."""
     end = program.intervals + (0 if program.closed and base.comes_back(program) else 1)
     for knots in blocks(program.first_free, end):
-        _at(program, knots)
+        _at(program, np.setdiff1d(knots, program.left_out))
 
 
-def _at(program: Program, knots: Block) -> None:
+def _at(program: Lifted, knots: Block) -> None:
     task, count, n, m = program.task, len(knots), program.n, program.task.m
     diagonal, target = np.arange(count), program.x_ref[knots]
 

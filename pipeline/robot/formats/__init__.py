@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 from pipeline.common.errors import RobotError
+from pipeline.robot import packages
 from pipeline.robot.formats import mjcf, sdf, urdf
 from pipeline.robot.markup import parse
 from pipeline.robot.tree import Tree
@@ -27,3 +29,23 @@ def load(file: Path, end_effector: str) -> Tree:
         allowed = "<robot> (URDF), <sdf> or <mujoco>"
         raise RobotError(f"robot.urdf = {file}: the root element is <{root.tag}>, expected {allowed}")
     return READERS[root.tag](root, file, end_effector)
+
+
+def files(file: Path) -> dict[str, Path]:
+    """All files that `file` is read from, itself first: what it includes, and what that includes, by their places from
+    its folder. One that is not there is left out.
+    """
+    found: dict[str, Path] = {}
+    left = [file]
+    while left:
+        one = left.pop()
+        name = os.path.relpath(one, file.parent)
+        if name in found or not one.is_file():
+            continue
+        found[name] = one
+        for include in parse(one.read_bytes(), one).iter("include"):
+            if (text := include.get("file")) is not None:
+                left.append(one.parent / text)
+            elif (inner := packages.model_file((include.findtext("uri") or "").strip(), one.parent)) is not None:
+                left.append(inner)
+    return found

@@ -38,6 +38,8 @@ def read(root: ET.Element, file: Path, end_effector: str) -> Tree:
     tops = [model for scope in (root, *root.findall("world")) for model in scope if model.tag in ("model", "include")]
     if not tops:
         raise tree.fail("the root element is <sdf> and holds no <model>; expected one, or <robot> for a URDF")
+    if not root.get("version"):
+        raise tree.fail(f"the element <{root.tag}> states no version; write <{root.tag} version='1.9'>")
     found: dict[str, str] = {}
     stated = [dict(_scoped(top, file, (), tree, found)) for top in tops]
     wanted = end_effector.rpartition("::")[2]

@@ -42,10 +42,10 @@ def _refuse_xacro(root: ET.Element, file: Path) -> None:
 
 
 def _inertial(link: ET.Element, where: str) -> Inertial | None:
-    inertial = link.find("inertial")
+    inertial = _only(link, "inertial", where)
     if inertial is None:
         return None
-    mass, inertia = inertial.find("mass"), inertial.find("inertia")
+    mass, inertia = _only(inertial, "mass", where), _only(inertial, "inertia", where)
     moments: Vector = (0.0,) * 6  # a point mass
     if inertia is not None:
         written = {key: inertia.get(key, "" if key in ("ixx", "iyy", "izz") else "0") for key in MOMENTS}
@@ -59,7 +59,7 @@ def _inertial(link: ET.Element, where: str) -> Inertial | None:
 
 
 def _joint(joint: ET.Element, where: str) -> Joint:
-    kind, limit, mimic = joint.get("type", ""), joint.find("limit"), joint.find("mimic")
+    kind, limit, mimic = joint.get("type", ""), _only(joint, "limit", where), _only(joint, "mimic", where)
     follows = None
     if mimic is not None:
         factors = (number(mimic.get(key, default), f"{where} in its mimic the {key}")
@@ -68,8 +68,8 @@ def _joint(joint: ET.Element, where: str) -> Joint:
     return Joint(
         joint.get("name", ""),
         kind,
-        _end(joint, "parent"),
-        _end(joint, "child"),
+        _end(joint, "parent", where),
+        _end(joint, "child", where),
         _vector(joint, "origin", "xyz", f"{where} in its"),
         _vector(joint, "origin", "rpy", f"{where} in its"),
         # An axis says nothing of a fixed joint, and many files have three zeros there.
@@ -81,12 +81,20 @@ def _joint(joint: ET.Element, where: str) -> Joint:
 
 def _vector(element: ET.Element, tag: str, key: str, where: str, absent: str = "0 0 0") -> Vector:
     """The three numbers of <origin xyz>, <origin rpy> or <axis xyz>."""
-    found = element.find(tag)
+    found = _only(element, tag, where)
     if found is None:
         return ZERO if absent == "0 0 0" else numbers(absent, 3, "")
     return numbers(found.get(key, absent), 3, f"{where} {tag} the {key}")
 
 
-def _end(joint: ET.Element, end: str) -> str:
-    found = joint.find(end)
+def _only(element: ET.Element, tag: str, where: str) -> ET.Element | None:
+    """The one element of a tag, or None; raises RobotError for several that say different things."""
+    found = element.findall(tag)
+    if len({ET.tostring(one).strip() for one in found}) > 1:
+        raise RobotError(f"{where} {len(found)} different <{tag}>; one is enough")
+    return found[0] if found else None
+
+
+def _end(joint: ET.Element, end: str, where: str) -> str:
+    found = _only(joint, end, where)
     return "" if found is None else found.get("link", "")

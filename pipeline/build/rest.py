@@ -1,0 +1,62 @@
+"""Rest at the ends, and limits of acceleration and jerk: refuse what does not go together, saying what would."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.common.arrays import Array
+from pipeline.common.errors import ConfigError
+from pipeline.model.kinematics import project
+from pipeline.problem.problem import Boundary, Problem
+
+SHARE = 0.05  # of the motion time, in which the suggested acceleration reaches the motion's largest joint speed
+
+
+def check_rest(problem: Problem) -> None:
+    """Raise ConfigError, one line, for rest that no motion can have or that has no best one."""
+    bounds, cyclic = problem.bounds, problem.boundary is Boundary.CYCLIC
+    if any(problem.rest) and not problem.reference.timing.at_rest:
+        raise ConfigError(
+            "boundary.rest: the path is entered and left at speed; choose a law that rests there (timing=raised_cosine "
+            "or quintic)"
+        )
+    if problem.zero_acceleration and not any(problem.rest):
+        raise ConfigError("boundary.zero_acceleration: of which ends is said by boundary.rest=[start,end]")
+    settles = all(problem.rest) and problem.zero_acceleration
+    if np.isfinite(bounds.jerk).any() and not (settles or cyclic):
+        raise ConfigError(
+            "limits.jerk: a motion that begins or ends with an acceleration has a jerk without bound there; set "
+            "boundary.rest=[start,end] and boundary.zero_acceleration=true"
+        )
+    limited = np.isfinite(bounds.acceleration) | np.isfinite(bounds.jerk)
+    given = problem.boundary is Boundary.FIXED and problem.rest[0]
+    if given and not problem.objective.second_order and not np.all(limited):
+        raise ConfigError(
+            "boundary.rest: with a given start and an objective of velocities there is no best motion from rest "
+            "unless the accelerations of all joints are limited: it would jump to its speed within one step, however "
+            f"short; set limits.acceleration, such as {suggested(problem):g} rad/s^2"
+        )
+
+
+def suggested(problem: Problem) -> float:
+    """An acceleration [rad/s^2] that leaves a motion time to speed up, and that the torque limits allow, to one digit.
+
+    That of the largest joint speed of the inertia-weighted pseudoinverse motion in a share of the motion time, or in
+    two steps of the grid if they are longer: a shorter layer would not be resolved.
+    """
+    times, arm = problem.times, problem.task.arm
+    within = max(SHARE * problem.reference.duration, 2 * float(np.diff(times).max()))
+    motion = _weighted_motion(problem)
+    least = float(np.abs(np.diff(motion, axis=0) / np.diff(times)[:, None]).max()) / within
+    inertia = np.abs(arm.mass_matrix(motion)).sum(axis=2)
+    least = min(least, float((problem.bounds.torque / inertia).min())) or 1.0
+    digit = 10.0 ** np.floor(np.log10(least))
+    return float(f"{max(np.floor(least / digit), 1.0) * digit:.1g}")
+
+
+def _weighted_motion(problem: Problem) -> Array:
+    rows = [problem.q_init[None]]
+    for target in problem.reference.position(problem.times[1:]):
+        inverse = np.linalg.inv(problem.task.arm.mass_matrix(rows[-1]))
+        rows.append(project(problem.task, rows[-1], target[None], inverse)[0])
+    return np.concatenate(rows)

@@ -1,0 +1,245 @@
+"""From optima by differences to splines that can be sent: each optimum's, within all limits between its knots too.
+
+Where none keeps them, the shortest motion time that would do is sought and said.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from pipeline.common.arrays import Array
+from pipeline.config.methods import GlobalOptions
+from pipeline.methods.method import Context
+from pipeline.problem.limits import FREE, LIMIT_KINDS
+from pipeline.problem.problem import Boundary, Problem
+from pipeline.problem.solution import Solution, Status, Trajectory
+from pipeline.program.spline.curve import Curve, objective
+from pipeline.program.spline.program import Solved, why_not
+from pipeline.program.spline.tighten import excesses, keeps_forces, tighten, without_forces, worst
+from pipeline.program.spline.transcription import transcribe
+from pipeline.search.selection import distinct
+
+STEPS = 25  # intervals of the first grid where torques count
+
+
+ATTEMPTS = 4  # motions from which the shortest time is sought
+
+
+TRACKING = 1e-8  # [m] at every knot; where two are left out, the path's own tolerance
+
+
+ENOUGH = 1e-6  # relative: how well limits must be kept
+
+
+@dataclass(frozen=True)
+class Smooth:
+    """A spline, whether it is an optimum, its objective; and the solves that led to it."""
+
+    curve: Curve
+    converged: bool
+    status: str
+    cost: float = np.inf
+    solves: list[dict[str, Any]] = field(default_factory=list)
+
+
+@dataclass
+class _Solver:
+    """Solves with their statistics."""
+
+    options: GlobalOptions
+    solves: list[dict[str, Any]] = field(default_factory=list)
+    last: Curve | None = None  # that a solve has converged to
+
+    @property
+    def given(self) -> dict[str, Any]:
+        own = self.options
+        return {"tolerance": own.tolerance, "max_iterations": own.max_iterations, "max_time": own.max_time}
+
+    def note(self, solved: Solved) -> Solved:
+        entry = {"solver": "ipopt, spline", "intervals": len(solved.curve.times) - 1, "iterations": solved.iterations}
+        self.solves.append(entry | {"wall_time_s": solved.outcome.wall_time, "status": solved.outcome.status})
+        self.last = solved.curve if solved.outcome.converged else self.last
+        return solved
+
+    def lazily(self, problem: Problem, guess: Curve) -> Solved:
+        """Torque and power limits come in only where the optimum without them breaks them."""
+        loose = without_forces(problem)
+        solved = self.note(transcribe(loose, guess).solve(**self.given))
+        if not solved.outcome.converged or keeps_forces(problem, solved.curve):
+            return solved
+        return self.whole(problem, solved.curve)
+
+    def whole(self, problem: Problem, guess: Curve) -> Solved:
+        return self.note(transcribe(problem, guess).solve(**self.given))
+
+
+def splined(problem: Problem, options: GlobalOptions) -> bool:
+    """Whether the motion is to be a spline: asked for by name, or by rest and limits that differences do not know."""
+    asks = any(problem.rest) or problem.bounds.smooth
+    return options.transcription == "spline" or (options.transcription is None and asks)
+
+
+def unserved(problem: Problem, options: GlobalOptions) -> str | None:
+    """What stands against the transcription that is asked for."""
+    if splined(problem, options):
+        why = why_not(problem)
+        return why and f"{why}, which method.global.transcription = spline does not serve"
+    if any(problem.rest) or problem.bounds.smooth:
+        return (
+            "method.global.transcription = differences keeps neither boundary.rest nor limits.acceleration or "
+            "limits.jerk; set it to spline"
+        )
+    return None
+
+
+def rough(problem: Problem) -> Problem:
+    """The problem without what differences do not know."""
+    limits = replace(problem.bounds, acceleration=FREE, jerk=FREE)
+    return replace(problem, rest=(False, False), zero_acceleration=False, limits=limits)
+
+
+def freer(problem: Problem) -> Problem:
+    """The same without limits that a motion keeps if only it takes its time: to start from where none are kept."""
+    free = np.full(problem.task.arm.n, np.inf)
+    loose = without_forces(rough(problem))
+    return replace(loose, limits=replace(loose.bounds, velocity=free))
+
+
+def unresolved(problem: Problem, motion: Array) -> str:
+    """That the grid is too coarse for the start from rest, and which would do; nothing where it is not.
+
+    Within the limits of acceleration the joints take some time to the speed at which the optimum by differences,
+    `motion`, jumps off: two steps are needed to see it.
+    """
+    bounds, times = problem.bounds, problem.times
+    if not (problem.rest[0] and problem.boundary is Boundary.FIXED) or problem.objective.second_order:
+        return ""
+    jump = np.abs(motion[1] - motion[0]) / (times[1] - times[0])
+    takes, steps = float((jump / bounds.acceleration).max()), len(times) - 1
+    needed = 2 * problem.reference.duration / takes if takes > 0 else 0.0
+    if needed <= steps or takes == 0:
+        return ""
+    enough = float(f"{1.05 * needed:.1e}")
+    return (
+        f"the start from rest takes {takes:.2g} s within limits.acceleration, less than two of {steps} steps, and its "
+        f"energy depends on the grid a little: timing.steps = {enough:.0f} or a smaller limit shows it"
+    )
+
+
+def smooth(problem: Problem, found: list[Solution], options: GlobalOptions, context: Context) -> list[Solution]:
+    """The distinct optima among the splines, best first; or one solution that says what stands against any."""
+    motions = [solution.trajectory.q for solution in found if solution.found]
+    if not motions:
+        return found
+    splines = context.workers.map(refine, (problem, options), motions)
+    log = found[0].statistics
+    if not any(spline.converged for spline in splines):
+        fastest = context.workers.map(shortest, (problem, options), [spline.curve for spline in splines][:ATTEMPTS])
+        best = min(fastest, key=lambda one: one.cost)
+        if best.cost > 1 + ENOUGH:
+            return [_nothing(problem, best, splines, log)]
+        splines = [refine((problem, options), best.curve.q)]
+    good = [spline for spline in splines if spline.converged]
+    if not good:
+        return [_nothing(problem, None, splines, log)]
+    costs = np.array([spline.cost for spline in good])
+    every = np.array([spline.curve.q for spline in good])
+    revolute = problem.task.arm.description.revolute
+    solutions = []
+    for rank, index in enumerate(distinct(every, costs, len(good), options.same_path, revolute)):
+        own = good[index]
+        solutions.append(
+            Solution(
+                "global",
+                Trajectory(problem.times, own.curve.q, own.curve.ends),
+                Status.SOLVED,
+                "; ".join(filter(None, [found[0].message, unresolved(problem, motions[0])])) if rank == 0 else "",
+                optimum=rank + 1,
+                tracking_tolerance=problem.reference.tolerance if problem.zero_acceleration else TRACKING,
+                limits_kept=LIMIT_KINDS,
+                statistics={**(log if rank == 0 else {}), "spline_solves": own.solves, "cost": own.cost},
+            )
+        )
+    return solutions
+
+
+def refine(context: tuple[Problem, GlobalOptions], motion: Array) -> Smooth:
+    """The spline that is nearest to an optimum by differences: coarse to fine where torques count."""
+    problem, options = context
+    solver, grids = _Solver(options), _grids(problem)
+    guess = Curve.through(problem, grids[0], CubicSpline(problem.times, motion)(grids[0]))
+    solved = solver.lazily(problem, guess)
+    if len(grids) > 1 and not solved.outcome.converged:
+        guess = Curve.through(problem, grids[-1], motion)
+        solved = solver.lazily(problem, guess)
+    elif len(grids) > 1:
+        loose = keeps_forces(problem, solved.curve)
+        for grid in grids[1:]:
+            guess = Curve.through(problem, grid, solved.curve(grid), solved.curve.ends)
+            solved = solver.lazily(problem, guess) if loose else solver.whole(problem, guess)
+    if solved.outcome.converged:
+        solved, further = tighten(problem, solved, **solver.given)
+        for one in further:
+            solver.note(one)
+    kept = all(float(excess.max()) <= ENOUGH for excess in excesses(problem, solved.curve).values())
+    status = solved.outcome.status if kept or not solved.outcome.converged else "exceeds a limit between its knots"
+    good = kept and solved.outcome.converged
+    curve = solved.curve if good or solver.last is None else solver.last
+    return Smooth(curve, good, status, objective(problem, curve), solver.solves)
+
+
+def shortest(context: tuple[Problem, GlobalOptions], start: Curve) -> Smooth:
+    """The motion of least time from `start`, the law of the path kept; `cost`: that time over the one asked for."""
+    problem, options = context
+    solver, curve = _Solver(options), start
+    for grid in _grids(problem):
+        guess = Curve.through(problem, grid, curve(grid), curve.ends)
+        program = transcribe(problem, guess, stretch=room(problem, guess))
+        solved = solver.note(program.solve(**solver.given))
+        if not solved.outcome.converged:
+            return Smooth(start, False, solved.outcome.status, np.inf, solver.solves)
+        curve = solved.curve
+    return Smooth(curve, True, solved.outcome.status, solved.stretch, solver.solves)
+
+
+def room(problem: Problem, curve: Curve) -> float:
+    """By how much a motion must be stretched so that it keeps its limits, if no gravity acts."""
+    powers = {"velocity": 1, "acceleration": 2, "jerk": 3, "torque": 2, "power": 3}
+    found = excesses(problem, curve)
+    return max(
+        (float(1 + found[kind].max()) ** (1 / power) for kind, power in powers.items() if kind in found), default=1.0
+    )
+
+
+def _grids(problem: Problem) -> list[Array]:
+    """One grid, but two or three where torques count."""
+    intervals = len(problem.times) - 1
+    bounds = problem.bounds
+    counts = problem.objective.second_order or np.isfinite(bounds.torque).any() or np.isfinite(bounds.power).any()
+    sizes = [intervals]
+    while counts and sizes[0] > STEPS:
+        sizes.insert(0, max(2, sizes[0] // 2))
+    place = np.arange(intervals + 1)
+    return [np.interp(np.linspace(0, intervals, size + 1), place, problem.times) for size in sizes]
+
+
+def _nothing(problem: Problem, fastest: Smooth | None, splines: list[Smooth], log: dict[str, Any]) -> Solution:
+    """No spline keeps every limit: which one cannot be met, and in what time all could."""
+    tried = f"none of {len(splines)} optima" if len(splines) > 1 else "the one optimum found"
+    standing = Trajectory(problem.times, np.tile(problem.q_init, (len(problem.times), 1)))
+    statistics = {**log, "spline_solves": [spline.solves for spline in splines]}
+    if fastest is None or not np.isfinite(fastest.cost):
+        words = "; ".join(sorted({spline.status for spline in splines}))
+        message = f"{tried} leads to a smooth motion within all limits ({words}); try more knots (timing.steps)"
+        return Solution("global", standing, Status.NOT_CONVERGED, message, statistics=statistics, found=False)
+    violation, duration = worst(problem, fastest.curve), problem.reference.duration * fastest.cost
+    assert violation is not None
+    message = (
+        f"{violation.bound} cannot be met between the knots: the least excess found is {violation.extent}; "
+        f"shortest feasible duration {duration:.4g} s"
+    )
+    return Solution("global", standing, Status.INFEASIBLE, message, statistics=statistics, found=False)

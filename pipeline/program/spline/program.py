@@ -1,0 +1,100 @@
+"""A spline program in the making: its unknowns with their starts and sizes (`transcription.py` says what they mean)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from pipeline.common.arrays import Array
+from pipeline.problem.lagrangian import trapezoid_weights
+from pipeline.problem.problem import Boundary, Problem
+from pipeline.program import ipopt
+from pipeline.program.program import Lifted
+from pipeline.program.scaling import POSITION_SCALE, Sums, scale
+from pipeline.program.spline.curve import Curve, free_ends, integrals, stations
+
+SMALL = 3e-4  # of velocities and accelerations among the unknowns, relative to the guess's, with the kinetic energy
+
+
+SMALL_WITH_TORQUE = 3e-3
+
+
+@dataclass(frozen=True)
+class Tightened:
+    """What of the limits holds at the knots so that they hold between them: torque, power (N + 1, n) are factors, and
+    keep_off [m] is by how much more than the margin obstacles are kept off.
+    """
+
+    torque: Array
+    power: Array
+    keep_off: float = 0.0
+
+    @classmethod
+    def none(cls, problem: Problem, times: Array) -> Tightened:
+        whole = np.ones((len(times), problem.task.arm.n))
+        return cls(whole, whole)
+
+
+@dataclass(frozen=True)
+class Solved:
+    """A spline as IPOPT leaves it; iterations; stretch: what its times are to be multiplied with."""
+
+    curve: Curve
+    outcome: ipopt.Outcome
+    iterations: int
+    stretch: float = field(default=1.0)
+
+
+class Spline(Lifted):
+    """The unknowns, scaled for a solve that starts at `guess`."""
+
+    def __init__(self, problem: Problem, guess: Curve, tightened: Tightened, *, stretch: float | None = None) -> None:
+        super().__init__(problem, guess.times, guess.q, keep_off=tightened.keep_off)
+        self.guess, self.tightened = guess, tightened
+        place, velocity, self.weights = stations(problem, guess)
+        costs = integrals(problem, guess if stretch is None else guess.stretched(stretch))
+        sums = Sums(place, self.weights, costs.tau, trapezoid_weights(guess.times))
+        self.scaling = scale(problem, sums, costs, self.forces)
+        small = SMALL_WITH_TORQUE if self.forces else SMALL
+        self.v_unit, self.a_unit = small / _size(guess.v), small / _size(guess.a)
+        self.v, self.a = self.new("v", self.v_unit * guess.v), self.new("a", self.a_unit * guess.a)
+        self.counts = self.lagrangian.is_quadratic and stretch is None
+        middle = place[-self.intervals :]
+        if self.counts:
+            self.w = self.new("w", self.scaling.to_w(velocity))
+            self.middle = self.new("middle", POSITION_SCALE * middle)
+            self.stations = np.vstack([self.y, self.middle]) if free_ends(problem) else self.middle
+        if self.forces:
+            self.new("forces", self.scaling.force * costs.tau[:, self.forces.rows])
+        # r, r^2, r^3
+        self.stretch = None if stretch is None else self.new("stretch", stretch ** np.array([1.0, 2.0, 3.0]))
+        if problem.zero_acceleration and not self.closed:
+            # Ends at rest without acceleration give the path's rows there all that they can be given.
+            self.left_out = tuple(
+                knot for knot, rests in zip((1, self.intervals - 1), problem.rest, strict=True) if rests
+            )
+
+    def solve(self, **options: object) -> Solved:
+        """Solve from the guess."""
+        outcome, iterations = self.run(**options)
+        q, v, a = (self.read(outcome, unknowns) for unknowns in (self.y, self.v, self.a))
+        curve = Curve(self.times, q / POSITION_SCALE, v / self.v_unit, a / self.a_unit)
+        stretch = 1.0 if self.stretch is None else float(self.read(outcome, self.stretch)[0])
+        return Solved(curve, outcome, iterations, stretch)
+
+
+def _size(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2))) or 1.0
+
+
+def why_not(problem: Problem) -> str | None:
+    """What a spline program does not serve, for a message; None: it serves the problem whole."""
+    arm = problem.task.arm
+    if arm.base.count:
+        return f"the base is {arm.base.kind}"
+    if problem.bounds_of_integrals:
+        return "integrals are bounded"
+    if problem.qd_init is not None and problem.boundary is Boundary.FIXED:
+        return "the first velocity is given"
+    return None

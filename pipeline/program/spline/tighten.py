@@ -1,0 +1,125 @@
+"""By how much a spline exceeds limits between its knots, and limits at the knots that prevent it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from pipeline.common.arrays import Array
+from pipeline.model.clearance import Clearance
+from pipeline.problem.problem import Problem
+from pipeline.program.feasibility import Violation
+from pipeline.program.spline.curve import Curve
+from pipeline.program.spline.program import Solved, Tightened
+from pipeline.program.spline.transcription import transcribe
+
+BETWEEN = 10  # points per interval
+
+
+ROUNDS = 8
+
+
+MARGIN = 1e-4  # relative, on what is tightened
+
+
+KEPT = 1e-7  # relative: excess that is none
+
+
+ROOM = 1e-3  # relative, to a torque limit that may be left out
+
+
+def sampled(times: Array, between: int = BETWEEN) -> Array:
+    """So many points per interval, the knots among them: (between N + 1,)."""
+    return np.interp(np.arange(between * (len(times) - 1) + 1) / between, np.arange(len(times)), times)
+
+
+def excesses(problem: Problem, curve: Curve) -> dict[str, Array]:
+    """By how much each kind of limit is exceeded (K, n) at the `sampled` times, relative to it; <= 0 where it is kept.
+
+    Those of position relative to half the range. The jerk, constant in an interval, is that before each sample.
+    """
+    bounds, moments = problem.bounds, sampled(curve.times)
+    q, v, a = curve(moments), curve(moments, 1), curve(moments, 2)
+    half = np.where(np.isfinite(bounds.upper - bounds.lower), (bounds.upper - bounds.lower) / 2, 1.0)
+    found = {}
+    if np.isfinite(bounds.upper).any() or np.isfinite(bounds.lower).any():
+        found["position"] = np.maximum(q - bounds.upper, bounds.lower - q) / half
+    if np.isfinite(bounds.torque).any() or np.isfinite(bounds.power).any():
+        tau = np.abs(problem.task.arm.inverse_dynamics(q, v, a))
+        found |= {"torque": tau / bounds.torque - 1, "power": tau * np.abs(v) / bounds.power - 1}
+    jerk = np.repeat(np.diff(curve.a, axis=0) / np.diff(curve.times)[:, None], BETWEEN, axis=0)
+    found |= {"velocity": np.abs(v) / bounds.velocity - 1, "acceleration": np.abs(a) / bounds.acceleration - 1}
+    found["jerk"] = np.abs(np.vstack([jerk[:1], jerk])) / bounds.jerk - 1
+    return {kind: excess for kind, excess in found.items() if excess.max() > -1.0}
+
+
+def worst(problem: Problem, curve: Curve) -> Violation | None:
+    """The limit that a spline exceeds most, relative to its size; None if there are none."""
+    found = excesses(problem, curve)
+    if not found:
+        return None
+    kind = max(found, key=lambda name: float(found[name].max()))
+    sample, joint = np.unravel_index(int(found[kind].argmax()), found[kind].shape)
+    moments, relative = sampled(curve.times), float(found[kind][sample, joint])
+    bounds = problem.bounds
+    if kind == "position":
+        reached = float(curve(moments[sample : sample + 1])[0, joint])
+        limit = float(bounds.upper[joint] if reached > bounds.lower[joint] else bounds.lower[joint])
+    else:
+        limit = float(np.broadcast_to(getattr(bounds, kind), problem.task.arm.n)[joint])
+        reached = limit * (1 + relative)
+    name = problem.task.arm.description.joints[joint]
+    return Violation(kind, name, limit, reached, float(moments[sample]), relative)
+
+
+def keeps_forces(problem: Problem, curve: Curve, room: float = ROOM) -> bool:
+    """Whether torque and power limits are kept with some room: an optimum without them is then one with them."""
+    found = excesses(problem, curve)
+    return all(float(found[kind].max()) < -room for kind in ("torque", "power") if kind in found)
+
+
+def without_forces(problem: Problem) -> Problem:
+    """The problem without limits of torque and power."""
+    free = np.full(problem.task.arm.n, np.inf)
+    return replace(problem, limits=replace(problem.bounds, torque=free, power=free))
+
+
+def tighten(problem: Problem, first: Solved, **options: object) -> tuple[Solved, list[Solved]]:
+    """The optimum that keeps its limits between the knots as well as at them, and all solves after the first.
+
+    Where a limit is exceeded in an interval its bounds at both knots are divided by that excess and a little more; from
+    round to round by more of it, since what lies between two knots may give way by less than they do.
+    """
+    solved, further, tightened = first, [], Tightened.none(problem, first.curve.times)
+    for count in range(ROUNDS):
+        stricter = _stricter(problem, solved.curve, tightened, 1.0 + count)
+        if stricter is None or not solved.outcome.converged:
+            break
+        tightened = stricter
+        solved = transcribe(problem, solved.curve, tightened).solve(**options)
+        further.append(solved)
+    return solved, further
+
+
+def _stricter(problem: Problem, curve: Curve, tightened: Tightened, gain: float) -> Tightened | None:
+    """Limits at the knots that leave out what this spline exceeds between them; None if it does not."""
+    found = excesses(problem, curve)
+    factors = {}
+    for kind in ("torque", "power"):
+        factors[kind] = own = getattr(tightened, kind).copy()
+        if kind in found:
+            beyond = np.maximum(found[kind], 0.0)
+            inner = np.lib.stride_tricks.sliding_window_view(beyond, BETWEEN + 1, axis=0)[::BETWEEN].max(axis=-1)
+            inner = np.where(inner > KEPT, gain * inner + MARGIN, 0.0)
+            own[:-1] = np.minimum(own[:-1], getattr(tightened, kind)[:-1] / (1 + inner))
+            own[1:] = np.minimum(own[1:], getattr(tightened, kind)[1:] / (1 + inner))
+    lacking = 0.0
+    if problem.obstacles is not None:
+        clear = Clearance(problem.task.arm, problem.obstacles).smallest(curve(sampled(curve.times)))
+        lacking = max(0.0, problem.obstacles.margin - float(clear.min()))
+    exceeded = any(float(found[kind].max()) > KEPT for kind in ("torque", "power") if kind in found)
+    if not exceeded and not lacking:
+        return None
+    more = (0.2 + gain) * lacking + 1e-7 if lacking else 0.0
+    return Tightened(factors["torque"], factors["power"], tightened.keep_off + more)

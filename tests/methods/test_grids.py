@@ -1,0 +1,66 @@
+"""The planner's knots: refined until its motions keep the path between them, up to a bound, or kept."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.build.problem import prepare
+from pipeline.config.methods import GlobalOptions
+from pipeline.evaluation.evaluation import evaluate
+from pipeline.methods.global_planner.grids import off_path, on_knots
+from pipeline.methods.global_planner.planner import global_planner
+from pipeline.problem.problem import Problem
+from pipeline.problem.resolution import path_error
+from pipeline.problem.solution import Status
+from tests.support import composed
+
+FEW = GlobalOptions(optimised=4, nodes=60)
+THREE_TURNS = ("path=circle", "path.radius=0.05", "path.angle=1080", "timing.steps=16")
+
+
+@pytest.fixture(scope="module")
+def turns() -> Problem:
+    return prepare(composed(*THREE_TURNS))
+
+
+def test_a_grid_too_coarse_for_the_path_is_refined(turns: Problem) -> None:
+    first, *_ = global_planner(turns, FEW)
+    judged = evaluate(turns, first)
+    assert judged.status is Status.SOLVED
+    assert judged.on_path
+    assert judged.tracking_error_between <= 1e-4
+    parts, left = divmod(len(first.trajectory.time) - 1, 16)
+    assert parts > 1
+    assert left == 0
+    np.testing.assert_allclose(first.trajectory.time[::parts], turns.times, atol=1e-12)
+    assert f"on {16 * parts} intervals: the 16 of timing.steps are too few" in first.message
+
+
+def test_a_motion_that_curves_more_than_its_path_is_measured_or_said() -> None:
+    problem = prepare(composed("timing=constant_speed", "path.length=0.3", "timing.steps=10", "path.tolerance=1e-5"))
+    coarse = global_planner(problem, replace(FEW, refine_to=None))[0]
+    judged = evaluate(problem, coarse)
+    assert len(coarse.trajectory.time) == 11
+    assert judged.status is Status.SOLVED
+    assert not judged.on_path
+    assert "off its path, which promises its knots alone" in judged.message
+    assert off_path(problem, coarse.trajectory.q)[0] == pytest.approx(judged.tracking_error_between, rel=1e-6)
+    assert path_error(problem, problem.times)[0] < 1e-12  # the path alone would not show it
+    refined = global_planner(problem, FEW)[0]
+    assert evaluate(problem, refined).status is Status.SOLVED
+    assert evaluate(problem, refined).on_path
+    assert len(refined.trajectory.time) > 11
+
+
+def test_beyond_the_bound_the_number_that_would_do_is_said(turns: Problem) -> None:
+    (nothing,) = global_planner(turns, replace(FEW, refine_to=40))
+    assert nothing.status is Status.NOT_CONVERGED
+    assert not nothing.found
+    assert "method.global.refine_to = 40" in nothing.message
+    needed = int(nothing.message.split("the path needs ")[1].split()[0])
+    times, why = on_knots(turns, needed)
+    assert len(times) == needed + 1
+    assert not why

@@ -1,0 +1,271 @@
+"""The program whose solution is a C2 spline: its derivatives, what its unknowns mean, its optima and its limits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from pydrake.autodiffutils import ExtractGradient, InitializeAutoDiff
+from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation
+
+from pipeline.common.arrays import Array
+from pipeline.model.kinematics import project
+from pipeline.model.task import PoseTask
+from pipeline.path.orientation import Orientation
+from pipeline.problem.limits import Limits
+from pipeline.problem.objective import Objective
+from pipeline.problem.problem import Boundary, Problem
+from pipeline.program.scaling import POSITION_SCALE
+from pipeline.program.spline.curve import Curve, objective
+from pipeline.program.spline.program import Spline, Tightened, why_not
+from pipeline.program.spline.tighten import excesses, keeps_forces, tighten, worst
+from pipeline.program.spline.transcription import transcribe
+from tests.program.test_program import program_jacobian, program_value
+from tests.support import free_line, robot
+
+Make = Callable[[int, int], Problem]
+Guess = Callable[[Problem], Array]
+
+BOUNDS: dict[str, Any] = {"acceleration": np.full(3, 2.0), "jerk": np.array([5.0, 6.0, np.inf])}
+LIMITS = replace(
+    Limits(-2 * np.ones(3), 2 * np.ones(3), np.full(3, 3.8), np.full(3, 0.4), np.array([0.7, 0.7, np.inf])), **BOUNDS
+)
+BOTH = (True, True)
+KINDS: dict[str, dict[str, Any]] = {
+    "kinetic energy, rest": {"rest": BOTH},
+    "kinetic energy, free ends": {"boundary": Boundary.FREE},
+    "torque, rest at the start": {"objective": Objective({"torque": 1.0}), "rest": (True, False)},
+    "both, limits": {
+        "objective": Objective({"kinetic_energy": 1.0, "torque": 0.3}),
+        "limits": LIMITS,
+        "rest": BOTH,
+        "zero_acceleration": True,
+    },
+    "velocity norm, cyclic": {"objective": Objective({"velocity_norm": 1.0}), "boundary": Boundary.CYCLIC},
+}
+
+
+@pytest.fixture
+def make(problem: Make, guess: Guess) -> Callable[..., Spline]:
+    """Trajectory 3 with 12 intervals (bindings of 10 and 2 knots) or another number of them, one of KINDS."""
+
+    def build(kind: str, intervals: int = 12, stretch: float = 0.0) -> Spline:
+        asked = replace(problem(3, intervals), **KINDS[kind])
+        return transcribe(asked, Curve.through(asked, asked.times, guess(asked)), stretch=stretch)
+
+    return build
+
+
+def assert_derivatives(made: Spline, rng: np.random.Generator) -> None:
+    x = made.drake.initial_guess() * (1 + 0.1 * rng.normal(size=made.drake.num_vars()))
+    got, h = program_jacobian(made, x), 1e-6
+    for way in rng.normal(size=(4, len(x))) * (np.abs(x) + 1e-3):
+        expected = (program_value(made, x + h * way) - program_value(made, x - h * way)) / (2 * h)
+        scale = np.abs(got) @ np.abs(way) + 1e-12
+        assert np.abs((got @ way - expected) / scale).max() < 1e-6
+    for binding in made.drake.generic_constraints():
+        evaluator = binding.evaluator()
+        y = evaluator.Eval(InitializeAutoDiff(rng.normal(size=evaluator.num_vars())).ravel())
+        pattern = evaluator.gradient_sparsity_pattern()
+        if pattern is not None:
+            assert {tuple(entry) for entry in np.argwhere(ExtractGradient(y)).tolist()} <= set(pattern)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_derivatives_of_the_whole_program_equal_central_differences(
+    make: Callable[..., Spline], rng: np.random.Generator, kind: str
+) -> None:
+    assert_derivatives(make(kind, 6), rng)
+
+
+def test_derivatives_where_the_motion_time_is_an_unknown(make: Callable[..., Spline], rng: np.random.Generator) -> None:
+    assert_derivatives(make("both, limits", 5, stretch=1.3), rng)
+
+
+def test_derivatives_for_a_pose_under_gravity(rng: np.random.Generator) -> None:
+    """With an end that need not rest: the row that keeps the tool still there turns with it."""
+    arm = robot("panda", gravity=(0.0, 0.0, -9.8))
+    task, q = PoseTask(arm), np.array([0.1, -0.7, 0.2, -2.2, 0.1, 1.5, 0.7])
+    asked = replace(free_line(4), task=task, q_init=q, objective=Objective({"torque": 1.0}), rest=(True, False))
+    pose = task.value(q[None])[0]
+    geometry = replace(asked.reference.geometry, start=pose[:3], direction=np.array([0.0, 1.0, 0.0]))
+    turning = Orientation(np.array([0.0, 0.4]), Rotation.from_rotvec([pose[3:], pose[3:] + 0.1]))
+    asked = replace(asked, reference=replace(asked.reference, geometry=geometry, orientation=turning))
+    motion = q + 0.02 * np.arange(5)[:, None] * np.ones(7)
+    assert_derivatives(transcribe(asked, Curve.through(asked, asked.times, motion)), rng)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_unknown_starts_at_the_guess(make: Callable[..., Spline], kind: str) -> None:
+    """Every row that ties unknowns to each other holds there, and the objective is 1."""
+    made = make(kind)
+    x, program = made.drake.initial_guess(), made.drake
+    for binding in program.linear_equality_constraints():
+        if "cyclic" not in kind:
+            np.testing.assert_allclose(program.EvalBinding(binding, x), 0.0, atol=1e-9)
+    np.testing.assert_allclose(x[: made.y.size].reshape(13, 3) / POSITION_SCALE, made.guess.q, rtol=1e-12)
+    assert program_value(made, x)[0] == pytest.approx(1.0, rel=1e-9)
+
+
+BEST = np.array([-0.389, 0.520, 0.190])  # near where the optimum of simulation 1 starts
+
+
+def weighted(problem: Problem) -> Array:
+    """The inertia-weighted pseudoinverse motion (N + 1, 3) of simulation 1 from there."""
+    targets = problem.reference.position(problem.times)
+    rows = [project(problem.task, BEST[None], targets[:1])[0]]
+    for point in targets[1:]:
+        inverse = np.linalg.inv(problem.task.arm.mass_matrix(rows[-1]))
+        rows.append(project(problem.task, rows[-1], point[None], inverse)[0])
+    return np.concatenate(rows)
+
+
+# --- optima ---------------------------------------------------------------------------------------------------------
+
+
+def fine_energy(problem: Problem, curve: Curve) -> float:
+    """The integral of the kinetic energy by Gauss's rule, six points an interval."""
+    node, weight = np.polynomial.legendre.leggauss(6)
+    h = np.diff(curve.times)[:, None]
+    moments = (curve.times[:-1, None] + h * (node + 1) / 2).ravel()
+    energy = problem.task.arm.kinetic_energy(curve(moments), curve(moments, 1))
+    return float(energy @ (h * weight / 2).ravel())
+
+
+@pytest.fixture
+def from_rest(problem: Make, guess: Guess) -> tuple[Problem, Curve]:
+    """Trajectory 3 at rest with accelerations of at most 1 rad/s^2, on 25 intervals, and its optimum."""
+    asked = replace(problem(3, 25), rest=BOTH, limits=replace(Limits.none(3), acceleration=np.ones(3)))
+    return asked, transcribe(asked, Curve.through(asked, asked.times, guess(asked))).solve().curve
+
+
+def test_trajectory_3_from_rest(from_rest: tuple[Problem, Curve]) -> None:
+    """An independent implementation (CasADi) found .006075 on 25 intervals, and .006073 from 100 on."""
+    asked, curve = from_rest
+    assert fine_energy(asked, curve) == pytest.approx(0.006075, abs=1e-6)
+    assert objective(asked, curve) == pytest.approx(fine_energy(asked, curve), rel=1e-3)
+    assert np.abs(curve.a).max() == pytest.approx(1.0, abs=1e-7)
+    np.testing.assert_allclose(curve.ends, 0.0, atol=1e-12)
+
+
+def test_the_solution_is_the_spline_through_its_knots(from_rest: tuple[Problem, Curve]) -> None:
+    """Velocities and accelerations among the unknowns are those of SciPy's clamped spline, which is exported."""
+    asked, curve = from_rest
+    spline = CubicSpline(asked.times, curve.q, bc_type="clamped")
+    np.testing.assert_allclose(curve.v, spline(asked.times, 1), atol=1e-8)
+    np.testing.assert_allclose(curve.a, spline(asked.times, 2), atol=1e-6)
+    error = asked.task.error(curve.q, asked.reference.position(asked.times))
+    assert np.abs(error).max() < 1e-8
+
+
+@pytest.mark.parametrize("rest", [BOTH, (False, False), (True, False)])
+def test_a_free_start_costs_what_the_calculus_of_variations_says(rest: tuple[bool, bool]) -> None:
+    """Rest is its natural condition: .0527173 J s in continuous time, whether it is asked for or not."""
+    asked = replace(free_line(25), rest=rest)
+    solved = transcribe(asked, Curve.through(asked, asked.times, weighted(asked))).solve()
+    assert solved.outcome.converged
+    assert fine_energy(asked, solved.curve) == pytest.approx(0.0527173, rel=1e-3)
+    assert np.abs(solved.curve.ends).max() < 1e-3
+
+
+def test_limits_of_jerk_and_no_acceleration_at_the_ends(problem: Make, guess: Guess) -> None:
+    """.00611 with jerks of at most 2 rad/s^3 (CasADi); two path rows are left out, and the path is kept there."""
+    bounds = replace(Limits.none(3), acceleration=np.ones(3), jerk=np.full(3, 2.0))
+    asked = replace(problem(3, 25), rest=BOTH, zero_acceleration=True, limits=bounds)
+    curve = transcribe(asked, Curve.through(asked, asked.times, guess(asked))).solve().curve
+    assert fine_energy(asked, curve) == pytest.approx(0.00611, abs=1e-5)
+    np.testing.assert_allclose(curve.a[[0, -1]], 0.0, atol=1e-12)
+    assert (np.abs(np.diff(curve.a, axis=0)) / 0.4).max() <= 2.0 + 1e-7
+    error = asked.task.error(curve.q, asked.reference.position(asked.times))
+    assert np.abs(error).max() < 1e-4
+
+
+def test_a_cycle_closes_smoothly(problem: Make, guess: Guess) -> None:
+    asked = replace(problem(2, 24), boundary=Boundary.CYCLIC)
+    curve = transcribe(asked, Curve.through(asked, asked.times, guess(asked))).solve().curve
+    for values in (curve.q, curve.v, curve.a):
+        np.testing.assert_allclose(values[-1], values[0], atol=1e-7)
+    assert np.abs(curve.v[0]).max() > 1e-3
+
+
+# --- limits ---------------------------------------------------------------------------------------------------------
+
+
+CUT = 0.98
+
+
+@pytest.fixture(scope="module")
+def tight() -> tuple[Problem, Curve]:
+    """Simulation 1's line at rest with limits that bind, and its optimum by squared torques without them."""
+    asked = replace(free_line(16), rest=BOTH, objective=Objective({"torque": 1.0}))
+    free = transcribe(asked, Curve.through(asked, asked.times, weighted(asked))).solve().curve
+    peak = {
+        kind: np.abs(values).max(axis=0)
+        for kind, values in (
+            ("velocity", free(np.linspace(0, 1, 251), 1)),
+            ("torque", asked.task.arm.inverse_dynamics(free.q, free.v, free.a)),
+        )
+    }
+    bounds = replace(Limits.none(3), velocity=CUT * peak["velocity"], torque=np.full(3, CUT * peak["torque"].max()))
+    return replace(asked, limits=bounds), free
+
+
+def test_limits_hold_between_the_knots(tight: tuple[Problem, Curve]) -> None:
+    """Sampled by other code, twenty times as finely as the knots: what binds does so to the digit."""
+    asked, free = tight
+    assert not keeps_forces(asked, free)
+    first = transcribe(asked, free).solve()
+    solved, further = tighten(asked, first)
+    assert first.outcome.converged
+    assert solved.outcome.converged
+    spline = CubicSpline(asked.times, solved.curve.q, bc_type="clamped")
+    fine = np.linspace(0.0, 1.0, 501)
+    qd, qdd = spline(fine, 1), spline(fine, 2)
+    tau = asked.task.arm.inverse_dynamics(spline(fine), qd, qdd)
+    speed, torque = np.abs(qd) / asked.bounds.velocity, np.abs(tau) / asked.bounds.torque
+    assert speed.max() <= 1 + 1e-6
+    assert torque.max() <= 1 + 1e-6
+    assert torque.max() > 0.99, "a limit that does not bind shows nothing"
+    before = max(float(excess.max()) for excess in excesses(asked, first.curve).values())
+    assert bool(further) == (before > 1e-7)
+
+
+def test_the_worst_excess_is_named(tight: tuple[Problem, Curve]) -> None:
+    asked, free = tight
+    found = worst(asked, free)
+    assert found is not None
+    assert found.kind in ("velocity", "torque")
+    assert found.relative == pytest.approx(1 / CUT - 1, abs=0.02)
+    assert found.reached == pytest.approx(found.limit * (1 + found.relative))
+    assert worst(replace(asked, limits=None), free) is None
+
+
+def test_the_shortest_motion_leaves_no_room_and_exceeds_nothing(tight: tuple[Problem, Curve]) -> None:
+    """Replayed in its own time it keeps every limit, and one of them binds."""
+    asked, free = tight
+    solved = transcribe(asked, free, stretch=1.2).solve()
+    assert solved.outcome.converged
+    assert 0.3 < solved.stretch < 1.0
+    fast = solved.curve.stretched(solved.stretch)
+    tau = asked.task.arm.inverse_dynamics(fast.q, fast.v, fast.a)
+    used = max(float((np.abs(tau) / asked.bounds.torque).max()), float((np.abs(fast.v) / asked.bounds.velocity).max()))
+    assert used == pytest.approx(1.0, abs=1e-5)
+
+
+def test_tightened_limits_hold_at_the_knots(tight: tuple[Problem, Curve]) -> None:
+    asked, free = tight
+    whole = Tightened.none(asked, asked.times)
+    solved = transcribe(asked, free, replace(whole, torque=0.98 * whole.torque)).solve()
+    tau = asked.task.arm.inverse_dynamics(solved.curve.q, solved.curve.v, solved.curve.a)
+    assert (np.abs(tau) / asked.bounds.torque).max() == pytest.approx(0.98, abs=1e-6)
+
+
+def test_what_it_does_not_serve(problem: Make) -> None:
+    asked = problem(3, 6)
+    assert why_not(asked) is None
+    assert why_not(replace(asked, bounds_of_integrals={"torque": 1.0})) == "integrals are bounded"
+    assert why_not(replace(asked, qd_init=np.zeros(3))) == "the first velocity is given"
