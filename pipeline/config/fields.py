@@ -79,6 +79,9 @@ Name = Annotated[str, BeforeValidator(_text), AfterValidator(as_name)]
 Text = Annotated[str, BeforeValidator(_text)]
 Numbers = tuple[Number, ...]
 Vector = Annotated[Numbers, Field(min_length=3, max_length=3)]
+Coordinate = Annotated[Number, Field(ge=-1e6, le=1e6)]  # [m or rad]: beyond, doubles no longer tell 1e-10 of it apart
+Coordinates = tuple[Coordinate, ...]
+Pose = Annotated[Coordinates, Field(min_length=3, max_length=3)]  # its position or its roll, pitch, yaw
 Words = Annotated[tuple[T, ...], Field(min_length=1), AfterValidator(once)]
 # One for all (joints, axes), or a list.
 OneOrList = Annotated[Annotated[T, Tag("number")] | Annotated[tuple[T, ...], Tag("array")], Discriminator(_kind)]

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field
 
-from pipeline.config.fields import Number, Numbers, OneOrList, Switch, Text, Vector, Whole, schema
+from pipeline.config.fields import Coordinates, Number, Numbers, OneOrList, Switch, Text, Vector, Whole, schema
 
 Direction = OneOrList[Number]
 START = "[m] task coordinates of the start; null: the end effector at robot.q_init"
@@ -52,7 +52,7 @@ class LineConfig(PathConfig):
     kind: Literal["line"] = "line"
     length: Annotated[Number, Field(ge=0, description="[m] length of the line; 0: it turns on the spot")] = 0.4
     direction: Annotated[Direction, Field(description="[deg] angle in the task plane, or a vector")] = 157.5
-    start: Annotated[Numbers | None, Field(description=START)] = None
+    start: Annotated[Coordinates | None, Field(description=START)] = None
 
 
 @schema
@@ -67,7 +67,7 @@ class CircleConfig(PathConfig):
     clockwise: Annotated[Switch, Field(description="which way round, seen against `normal`")] = False
     angle: Annotated[Number, Field(gt=0, le=360_000, description="[deg] how much of the circle")] = 360.0
     normal: Annotated[Vector, Field(description="of the circle's plane, for tasks in space")] = (0.0, 0.0, 1.0)
-    start: Annotated[Numbers | None, Field(description=START)] = None
+    start: Annotated[Coordinates | None, Field(description=START)] = None
 
 
 @schema

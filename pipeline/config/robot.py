@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from pipeline.config.fields import Name, Number, OneOrList, Switch, Text, Vector, Words, schema
+from pipeline.config.fields import Name, Number, OneOrList, Pose, Switch, Text, Vector, Words, schema
 
 Position = Annotated[Number, Field(ge=-1e4, le=1e4)]  # [rad or m] of a joint: a sine is exact there
 Positions = tuple[Position, ...]
@@ -58,13 +58,13 @@ class RobotConfig:
     ] = "robots/planar3r.urdf"
     base: Annotated[Text | None, Field(description="first link of the chain; null: the root link")] = None
     end_effector: Annotated[Text, Field(description="last link of the chain")] = "tip"
-    offset: Annotated[Vector, Field(description="[m] end-effector frame in that link")] = ORIGIN
-    offset_rpy: Annotated[Vector, Field(description="[rad] its roll, pitch, yaw there")] = ORIGIN
-    base_position: Annotated[Vector, Field(description="[m] where the root link stands")] = ORIGIN
-    base_rpy: Annotated[Vector, Field(description="[rad] roll, pitch, yaw of the root link")] = ORIGIN
-    payload: Annotated[Number, Field(ge=0, description="[kg] point mass at the end effector")] = 0.0
+    offset: Annotated[Pose, Field(description="[m] end-effector frame in that link")] = ORIGIN
+    offset_rpy: Annotated[Pose, Field(description="[rad] its roll, pitch, yaw there")] = ORIGIN
+    base_position: Annotated[Pose, Field(description="[m] where the root link stands")] = ORIGIN
+    base_rpy: Annotated[Pose, Field(description="[rad] roll, pitch, yaw of the root link")] = ORIGIN
+    payload: Annotated[Number, Field(ge=0, le=1e6, description="[kg] point mass at the end effector")] = 0.0
     armature: Annotated[
-        OneOrList[Annotated[Number, Field(ge=0)]],
+        OneOrList[Annotated[Number, Field(ge=0, le=1e6)]],
         Field(description="[kg m^2] rotor inertia as the joints feel it, one or one per joint"),
     ] = 0.0
     task: Annotated[

@@ -12,6 +12,7 @@ from hydra.errors import HydraException
 from omegaconf.errors import OmegaConfBaseException
 
 from pipeline.common.errors import InputError
+from pipeline.run import ownership
 from pipeline.run.refusals import in_one_line
 from pipeline.run.termination import CODE, Terminated
 
@@ -50,8 +51,10 @@ def told(error: BaseException) -> tuple[str, int]:
             return f"not UTF-8 text: {_joined(error)}", 2
         case OSError() if error.filename is not None:
             return f"cannot read or write {error.filename!s}: {error.strerror or _joined(error)}", 2
-        case OSError():
-            return f"cannot read or write: {_joined(error)}", 2
+        case OSError() if error.errno is None:  # OmegaConf's, of a file that holds no table
+            return f"not a table of keys and values: {_joined(error)}", 2
+        case OSError():  # a disk that is full has no name of its own
+            return f"cannot write{ownership.names()}: {error.strerror}", 2
         case ValueError() if re.search(r"[/\\](omegaconf|hydra|antlr4)[/\\]", _last(error)):
             # Hydra lets some malformed overrides through to a bare ValueError.
             return f"{' '.join(sys.argv[1:])}: {_joined(error)}", 2

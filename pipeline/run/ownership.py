@@ -52,6 +52,11 @@ def release(folder: Path | None = None) -> None:
         os.close(_held.pop(mine))
 
 
+def names() -> str:
+    """` into` the folders that this process holds, for a message; nothing if it holds none."""
+    return f" into {', '.join(map(str, _held))}" if _held else ""
+
+
 def _locked(file: Path) -> int | None:
     """The lock file, open and locked; None if another process has it."""
     while True:

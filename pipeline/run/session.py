@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 import uuid
 from collections.abc import Iterator
@@ -10,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hydra.core.override_parser.overrides_parser import OverridesParser
+from hydra.core.override_parser.types import ChoiceSweep, Override, RangeSweep
 from hydra.core.utils import JobReturn
 from hydra.experimental.callback import Callback
 from omegaconf import DictConfig, OmegaConf
@@ -22,6 +24,7 @@ if TYPE_CHECKING:
     from pipeline.config.run import RunConfig
 
 MARK = ".sweep"  # in a run's folder: which start of a sweep it belongs to
+MOST_RUNS = 10_000  # of a sweep: each has a folder
 SHARED = "two runs of the sweep share it; hydra.sweep.subdir must tell them apart, as ${hydra:job.num} does"
 
 exit_code = 0  # of the process: 0 all confirmed, 1 a method failed, 2 bad input
@@ -121,6 +124,9 @@ def _refuse_jobs(config: DictConfig) -> None:
     template = str(OmegaConf.to_container(config.hydra.sweep, resolve=False)["subdir"])  # type: ignore[index,call-overload]
     if "${" not in template and any(word.is_sweep_override() for word in words):
         raise ConfigError(f"hydra.sweep.subdir = {template}: {SHARED}")
+    runs = math.prod(map(_values, words))
+    if not runs <= MOST_RUNS:  # a range to or by nan too
+        raise ConfigError(f"{' '.join(map(str, asked or ()))}: {runs:.3g} runs; a sweep has at most {MOST_RUNS}")
     for word in words:
         if word.key_or_group != "name":
             continue
@@ -130,3 +136,13 @@ def _refuse_jobs(config: DictConfig) -> None:
                 as_name(str(value).strip("'\""))
             except ValueError as error:
                 raise ConfigError(f"name = {value}: {error}") from None
+
+
+def _values(word: Override) -> float:
+    """How many values a word of the command line gives: counted, not made."""
+    value = word.value()
+    if isinstance(value, RangeSweep):
+        start, stop, step = (float(part or 0) for part in (value.start, value.stop, value.step))
+        count = (stop - start) / step if step else math.inf
+        return 0.0 if count < 0 else count
+    return len(value.list) if isinstance(value, ChoiceSweep) else 1

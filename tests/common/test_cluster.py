@@ -59,6 +59,7 @@ class Cluster:
     address: str = ""
     processes: list[subprocess.Popen[bytes]] = field(default_factory=list)
     said_before_any_worker: str = ""
+    refused_before_any_worker: str = ""
 
     def begin(self, *words: str) -> subprocess.Popen[bytes]:
         environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "tests")])}
@@ -98,6 +99,9 @@ def two_workers(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
         with redirect_stdout(io.StringIO()) as said:
             Workers(address=started.address).check()
         started.said_before_any_worker = said.getvalue()
+        with pytest.raises(ConfigError) as refused, redirect_stdout(io.StringIO()):
+            Workers(address=started.address, wait=0.05).map(work, started.folder, [1.0])
+        started.refused_before_any_worker = str(refused.value)
         started.begin_worker()
         started.begin_worker(threads=2)
         started.wait_for_workers(2)
@@ -195,8 +199,10 @@ def test_workers_of_other_versions_are_refused(
         Workers(address=two_workers.address).map(work, tmp_path, [2.0])
 
 
-def test_a_cluster_without_workers_says_so(two_workers: Cluster) -> None:
+def test_a_cluster_without_workers_says_so_and_is_not_waited_for_without_end(two_workers: Cluster) -> None:
     assert "no workers yet" in two_workers.said_before_any_worker
+    there = f"parallel.address = {two_workers.address}"
+    assert two_workers.refused_before_any_worker == f"{there}: no worker came within parallel.wait = 0.05 s"
 
 
 @pytest.mark.parametrize(

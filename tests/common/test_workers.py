@@ -19,6 +19,7 @@ from pipeline.common.workers import Workers
 from pipeline.config import run as config
 from pipeline.methods import method
 from pipeline.methods.global_planner.planner import global_planner
+from pipeline.problem.solution import Status
 from pipeline.run.run import UNFINISHED
 from tests.commands import call
 from tests.killed import run_and_kill
@@ -231,6 +232,15 @@ def test_what_a_clock_has_stopped_is_not_kept(tmp_path: Path) -> None:
     for _ in range(2):
         Workers(1, tmp_path / "store").map(unsure, Context(tmp_path), [1.0])
     assert calls(tmp_path) == [1.0, 1.0]
+
+
+def test_a_solve_that_met_its_max_time_is_stopped_and_never_kept(tmp_path: Path) -> None:
+    solver = {"configurations": 2, "candidates": 20, "optimised": 1, **ALONE}
+    asked = config.check({**SIM1, "method": {"global": {**solver, "max_time": 1e-9}}})
+    (solution,) = global_planner(prepare(asked), asked.method.global_, method.Context(1, Workers(1, tmp_path)))
+    assert solution.status is Status.NOT_CONVERGED
+    assert "stopped at max_time" in str(solution.statistics)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_other_source_is_other_work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

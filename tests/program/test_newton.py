@@ -291,7 +291,7 @@ def test_ipopt_confirms_an_optimum_beside_an_obstacle() -> None:
 @pytest.mark.parametrize("words", [("base.angular_momentum=[0,0,0.02]",), ("limits=joint",)])
 def test_ipopt_confirms_optima_of_an_arm_that_floats(words: tuple[str, ...]) -> None:
     problem = prepare(composed("+experiment=floating3r", "timing.steps=12", *words))
-    starts = Roadmap(nodes=60, most=4).starts(problem, problem.times, np.random.default_rng(1))
+    starts = Roadmap(problem, problem.times, np.random.default_rng(1), nodes=60).cheapest(4)
     answer = Solver(problem).on(problem.times).solve(starts)
     assert answer.converged.any()
     q = answer.q[np.flatnonzero(answer.converged)[np.argmin(answer.cost[answer.converged])]]

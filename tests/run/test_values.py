@@ -46,6 +46,12 @@ VALUES = {
     "limits length": (["limits.velocity=[1.0,2.0]"], ["limits.velocity", "2", "3"]),
     "limits sign": (["limits.velocity=-1"], ["limits.velocity", "-1", "> 0"]),
     "limits contradict": (["limits.lower=1.0", "limits.upper=-1.0"], ["limits.lower", "limits.upper", "joint1"]),
+    "beyond doubles": (["timing.duration=1e-300"], ["timing.duration = 1e-300", "from 1e-30 to 1e+30"]),
+    "beyond doubles, in a list": (["gravity=[1e300,0,0]"], ["gravity[0]", "from 1e-30 to 1e+30"]),
+    "too far": (["robot.base_position=[1e16,0,0]"], ["robot.base_position[0]", "<= 1e+06"]),
+    "too many turns": (["robot.q_init=[1e16,0.3,-0.7]"], ["robot.q_init[0]", "<= 10000"]),
+    "too heavy": (["robot.payload=1e16"], ["robot.payload", "<= 1e+06"]),
+    "too heavy a rotor": (["robot.armature=[1e16,0,0]"], ["robot.armature[0]", "<= 1e+06"]),
     "far too many steps": (["timing.steps=100000000000"], ["timing.steps"]),
 }
 
