@@ -81,6 +81,7 @@ def component(file: Path, entity: str, name: str) -> object:
     return [batch[name].to_pylist()[-1] for batch in batches if name in batch.schema.names][-1]
 
 
+@pytest.mark.slow
 def test_every_series_reads_back(case: Case, tmp_path: Path) -> None:
     problem, evaluations = case
     write(tmp_path / "run.rrd", problem, evaluations)

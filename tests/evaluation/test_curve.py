@@ -36,6 +36,7 @@ def independent_error(problem: Problem, q: Array) -> float:
     return float(np.linalg.norm(problem.task.error(motion, problem.reference.position(t)), axis=1).max())
 
 
+@pytest.mark.slow
 def test_a_grid_too_coarse_for_its_path_is_not_solved_and_the_advised_one_is() -> None:
     problem = prepare(composed(*TWENTY_TURNS))
     judged = evaluate(problem, on_knots(problem))

@@ -165,6 +165,7 @@ def test_an_attitude_that_is_exceeded_is_named() -> None:
     assert relaxed.feasible  # there is a way to turn less
 
 
+@pytest.mark.slow
 def test_a_fine_grid_does_not_make_a_cycle_harder() -> None:
     """Closed joints leave the base turns about the centre of mass alone: rows that these cannot change must go."""
     _, solution = stated(*ON_BASE, *CIRCLE, "timing.steps=100", "method.global.optimised=1")

@@ -107,6 +107,7 @@ class TestPublished:
         assert peaks(best.tau)[0] == pytest.approx(0.7067, rel=5e-3)
         assert best.torque_integral[-1] == pytest.approx(0.1826, rel=5e-3)
 
+    @pytest.mark.slow
     def test_sim2(self, starts: tuple[str, ...]) -> None:
         problem, motions = solved("+experiment=sim2", *starts)
         assert_sound(problem, motions)
@@ -128,6 +129,7 @@ class TestPublished:
             np.testing.assert_allclose(motion.qd[-1], motion.qd[0], atol=1e-12)
 
 
+@pytest.mark.slow
 def test_sim3_is_better_than_printed() -> None:
     problem, motions = solved("+experiment=sim3", *FEW)
     assert_sound(problem, motions)
@@ -285,6 +287,7 @@ def test_a_mixed_objective_lies_between() -> None:
     assert (change[:, 1] < 0).all()
 
 
+@pytest.mark.slow
 def test_dense_knots_stand_where_asked_and_the_optimum_is_the_same() -> None:
     problem, motions = solved("+experiment=sim1", GRID, "timing.dense=[[0.4,0.6,3]]")
     assert_sound(problem, motions)
@@ -301,6 +304,7 @@ def test_dense_knots_stand_where_asked_and_the_optimum_is_the_same() -> None:
         assert other == pytest.approx(one, rel=2e-3)
 
 
+@pytest.mark.slow
 def test_a_function_of_the_seed_and_not_of_the_number_of_workers() -> None:
     config = configured(*COARSE, "method.global.optimised=4")
     problem = prepare(config)

@@ -27,6 +27,7 @@ def solved(number: int, method: str) -> tuple[Problem, list[Evaluation]]:
     return problem, [evaluate(problem, solution) for solution in solutions]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("number", "energy"), [(1, 8.81e-4), (2, 5.37e-3), (4, 5.17e-2)])
 def test_lsv(number: int, energy: float) -> None:
     (motion,) = solved(number, "lsv")[1]
