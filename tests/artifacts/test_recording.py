@@ -104,6 +104,7 @@ def test_every_series_reads_back(case: Case, tmp_path: Path) -> None:
         recording.read_series(tmp_path / "run.rrd", "/pmke/joint_position")
 
 
+@pytest.mark.slow
 def test_the_pictures_and_facts_are_there(case: Case, tmp_path: Path) -> None:
     problem, evaluations = case
     file = tmp_path / "run.rrd"

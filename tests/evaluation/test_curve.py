@@ -65,6 +65,7 @@ def test_the_tolerance_is_that_of_the_configuration() -> None:
     assert "promises its knots alone" in certificate.message
 
 
+@pytest.mark.slow
 def test_a_drift_within_the_promise_is_said() -> None:
     problem = prepare(composed("path.length=0.1", "timing.steps=40"))
     solution = on_knots(problem)

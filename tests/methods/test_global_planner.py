@@ -147,6 +147,7 @@ def test_sim4_is_better_than_printed() -> None:
     assert peaks(motions[0].power)[:2].max() == pytest.approx(0.7, rel=1e-5)
 
 
+@pytest.mark.slow
 def test_more_limits_never_cost_less() -> None:
     free, limited = (solved(f"+experiment=sim{i}", GRID)[1][0].energy_integral[-1] for i in (1, 2))
     assert limited > free
