@@ -42,8 +42,7 @@ SMALL = (
     *("method.calculus_of_variations.spacing=0.3", "method.calculus_of_variations.refinements=1"),
     *(
         "method.calculus_of_variations.max_speed=0.5",
-        "method.pontryagin.guesses=1",
-        "method.pontryagin.max_nodes=1000",
+        "method.pontryagin.guesses=2",
         "method.pontryagin.intervals=10",
     ),
 )
