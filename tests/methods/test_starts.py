@@ -92,6 +92,8 @@ def test_whole_turns_are_one_optimum_and_the_first_start_of_a_basin_dates_it() -
     found = basins(problem, problem.times, ends(0.01, 0.5, 0.0), 0.05)  # the best came last, to a basin known first
     assert [optimum.cost for optimum in found.optima] == [1.0, 1.5]
     assert found.barren == 1
+    near = basins(problem, problem.times, ends(0.0, 0.5, 1.0, cost=2.0), 0.05, dearest=1.3)
+    assert [optimum.cost for optimum in near.optima] == [2.0, 2.5]
 
 
 def test_further_starts_stand_on_the_knots_asked_for() -> None:
