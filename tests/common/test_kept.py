@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import pickle
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -37,6 +38,12 @@ class Code:
         return Path.touch, (Path("ran"),)  # type: ignore[return-value]
 
 
+@dataclass
+class Foreign:
+    def __post_init__(self) -> None:
+        Path("ran").touch()
+
+
 def sealed(content: bytes) -> bytes:
     """With the digest that belongs to it: whoever can write a file can write that too."""
     import hashlib
@@ -55,6 +62,8 @@ FOREIGN = {
     "pickled array": archive(b'{"array": 0}', array_0=np.array([Code()], dtype=object)),
     "function": archive(b'{"of": ["pipeline.common.files", "sweep_unfinished"], "has": {"folder": "."}}'),
     "other package": archive(b'{"of": ["subprocess", "Popen"], "has": {"args": ["touch", "ran"]}}'),
+    "other dataclass": archive(f'{{"of": ["{__name__}", "Foreign"], "has": {{}}}}'.encode()),
+    "no dataclass": archive(b'{"of": ["pipeline.common.errors", "InputError"], "has": {}}'),
     "module not loaded": archive(b'{"of": ["pipeline.nowhere", "X"], "has": {}}'),
     "no table": archive(b'{"of": 3}'),
     "no JSON": archive(b"{"),
@@ -69,3 +78,9 @@ def test_what_somebody_else_wrote_runs_nothing(case: str, tmp_path: Path, monkey
     with pytest.raises(ValueError, match=r"no result|not what was written"):
         kept.loads(FOREIGN[case])
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_result_under_the_digest_of_another_is_refused() -> None:
+    one, other = (kept.dumps(np.full(4, value)) for value in (1.5, 2.5))
+    with pytest.raises(ValueError, match="not what was written"):
+        kept.loads(other[:-32] + one[-32:])

@@ -249,3 +249,9 @@ def test_other_source_is_other_work(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(versions, "source", lambda: "another")
     assert "source another" in versions.stamp.__wrapped__()
     assert versions.versions()["source"] == "another"
+
+
+def test_a_worker_of_a_pool_that_was_started_again_takes_what_is_kept(tmp_path: Path) -> None:
+    for _ in range(2):
+        assert workers_module._in_a_worker(multiply, Context(tmp_path, 2.0), 4.0, tmp_path / "four.result") == 8.0
+    assert calls(tmp_path) == [4.0]

@@ -10,10 +10,10 @@ import pytest
 from pipeline.build.problem import prepare
 from pipeline.config.methods import GlobalOptions
 from pipeline.evaluation.evaluation import evaluate
-from pipeline.methods.global_planner.grids import off_path, on_knots
+from pipeline.methods.global_planner.grids import coarsest, finer, off_path, on_knots
 from pipeline.methods.global_planner.planner import global_planner
 from pipeline.problem.problem import Problem
-from pipeline.problem.resolution import path_error
+from pipeline.problem.resolution import path_error, roughly
 from pipeline.problem.solution import Status
 from tests.support import composed
 
@@ -64,3 +64,25 @@ def test_beyond_the_bound_the_number_that_would_do_is_said(turns: Problem) -> No
     times, why = on_knots(turns, needed)
     assert len(times) == needed + 1
     assert not why
+
+
+def test_finer_knots_stay_within_the_bound(turns: Problem) -> None:
+    still = np.tile(turns.q_init, (len(turns.times), 1))
+    assert finer(turns, None, [still]) is None
+    assert finer(turns, 31, [still]) is None
+    knots = finer(turns, 40, [still])
+    assert knots is not None
+    assert len(knots) == 2 * 16 + 1
+
+
+def test_the_coarsest_grid_shows_the_shape_of_the_path_unless_it_is_given(turns: Problem) -> None:
+    assert coarsest(turns, 5, 4) == 5
+    assert coarsest(turns, None, 4) == roughly(turns, 4) > 4
+
+
+def test_a_motion_that_does_not_turn_with_its_path_is_off_by_the_angle() -> None:
+    words = ("robot=panda", "robot.orientation=full", "path.length=0", "path.direction=[0,1,0]", "timing.steps=6")
+    problem = prepare(composed(*words, "path.turn=[0,0,0.8]"))
+    distance, angle = off_path(problem, np.tile(problem.q_init, (7, 1)))
+    assert distance < 1e-9
+    assert angle == pytest.approx(0.8)

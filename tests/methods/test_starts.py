@@ -84,3 +84,22 @@ def test_drawing_ends_when_half_of_the_starts_brought_nothing_new_or_with_the_bu
     assert 2 * log["barren_starts"] >= len(log["starts"]) or len(log["starts"]) == options.budget
     log = global_planner(problem, GlobalOptions(nodes=60, optimised=8, budget=11))[0].statistics
     assert len(log["starts"]) == 11
+
+
+def test_whole_turns_are_one_optimum_and_the_first_start_of_a_basin_dates_it() -> None:
+    problem = free_line(12)
+    turned = basins(problem, problem.times, ends(0.0, 2 * np.pi), 0.05)
+    assert turned.members == [2]
+    found = basins(problem, problem.times, ends(0.01, 0.5, 0.0), 0.05)  # the best came last, to a basin known first
+    assert [optimum.cost for optimum in found.optima] == [1.0, 1.5]
+    assert found.barren == 1
+    near = basins(problem, problem.times, ends(0.0, 0.5, 1.0, cost=2.0), 0.05, dearest=1.3)
+    assert [optimum.cost for optimum in near.optima] == [2.0, 2.5]
+
+
+def test_further_starts_stand_on_the_knots_asked_for() -> None:
+    drawn = lots("population")
+    finer = np.linspace(0.0, drawn.grid[-1], 2 * len(drawn.grid) - 1)
+    more = drawn.further(3, finer)
+    assert 0 < len(more) <= 3
+    assert more.shape[1:] == (len(finer), 3)

@@ -58,3 +58,10 @@ def test_a_line_at_constant_speed_shows_nothing_and_the_error_falls_by_its_order
 def test_a_coarse_grid_shows_the_shape_of_its_path() -> None:
     assert roughly(prepare(composed()), 25) == 25
     assert 100 < roughly(prepare(composed(*TURNS)), 25) < 400
+
+
+def test_an_orientation_that_turns_by_more_than_half_a_turn_is_one_smooth_curve() -> None:
+    words = ("robot=panda", "robot.orientation=full", "path.length=0", "path.direction=[0,1,0]", "timing.steps=40")
+    problem = prepare(composed(*words, "path.turn=[0,0,5.0]"))
+    assert np.abs(np.diff(problem.reference.position(problem.times)[:, 3:], axis=0)).max() > 3  # from pi to -pi
+    assert path_error(problem, problem.times)[1] < 0.01

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
+import pytest
 
 from pipeline.build.problem import prepare
 from pipeline.config.methods import GlobalOptions
 from pipeline.evaluation.evaluation import evaluate
 from pipeline.methods.global_planner.planner import global_planner
+from pipeline.problem.limits import Limits
 from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Status
 from pipeline.problem.turns import endless, full_turns
@@ -39,3 +43,17 @@ def test_only_joints_that_nothing_limits_may_wind() -> None:
     start, end = np.zeros((2, 3)), np.array([[6.2, -6.4, 0.1], [-13.0, 3.0, 0.0]])
     np.testing.assert_allclose(full_turns(free, start, end) / (2 * np.pi), [[1, -1, 0], [-2, 0, 0]])
     np.testing.assert_array_equal(full_turns(limited, start, end), 0.0)
+
+
+@pytest.mark.parametrize(("side", "limit"), [("lower", -1.0), ("upper", 1.0)])
+def test_a_limit_on_one_side_alone_keeps_a_joint_from_winding(side: str, limit: float) -> None:
+    limits = replace(Limits.none(3), **{side: np.array([limit, *(2 * [np.copysign(np.inf, limit)])])})
+    np.testing.assert_array_equal(endless(replace(around_the_base(), limits=limits)), [False, True, True])
+
+
+def test_joints_alone_wind_as_they_do_with_their_floating_base() -> None:
+    floating = prepare(composed("robot=planar3r_base", "base=free"))
+    end = 2 * np.pi * np.array([1.0, -2.0, 0.1])
+    np.testing.assert_allclose(full_turns(floating, np.zeros(3), end) / (2 * np.pi), [1, -2, 0])
+    whole = np.concatenate([np.full(floating.task.arm.n - 3, 9.0), end])
+    np.testing.assert_array_equal(full_turns(floating, 0 * whole, whole)[:-3], 0.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import linecache
 import resource
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -10,7 +11,10 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.run.failures import told
+from pipeline.common import kept
+from pipeline.common.errors import InputError
+from pipeline.run.failures import foreseen, leaves, told, where
+from pipeline.run.termination import Terminated
 from tests.commands import Run, assert_refused, call
 from tests.reports import leave_out_pictures
 
@@ -89,3 +93,21 @@ def test_what_nobody_foresaw_is_no_bad_input() -> None:
     assert told(RuntimeError("a\n bug")) == ("RuntimeError: a bug", 1)
     assert told(ValueError("ours")) == ("ValueError: ours", 1)
     assert told(KeyboardInterrupt()) == ("interrupted", 130)
+    assert told(Terminated())[1] == 143
+    assert told(SystemExit("abort\n at a.cc")) == ("Drake: abort at a.cc", 1)
+
+
+def test_who_was_asked_to_leave_has_not_failed() -> None:
+    asked = (SystemExit(3), SystemExit(), KeyboardInterrupt(), Terminated())
+    assert all(leaves(error) for error in asked)
+    assert not any(leaves(error) for error in (SystemExit("abort"), RuntimeError(), MemoryError()))
+
+
+def test_a_bug_of_ours_keeps_its_traceback_and_its_innermost_line() -> None:
+    assert foreseen(MemoryError(), 1)
+    assert foreseen(InputError("bad"), 2)
+    assert not foreseen(RuntimeError("a bug"), 1)
+    with pytest.raises(TypeError) as caught:
+        kept.dumps([object()])
+    file, _, line = where(caught.value).rpartition(":")
+    assert "raise TypeError" in linecache.getline(file, int(line))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import json
 import os
 import signal
@@ -133,3 +134,24 @@ def test_how_to_write_what_hydra_reads_in_quotes_only(run: Run, tmp_path: Path) 
     (tmp_path / "arm ö.urdf").write_bytes((ROOT / "robots" / "planar3r.urdf").read_bytes())
     assert_refused(run(*LSV, "robot.urdf=arm ö.urdf"), "'robot.urdf=\"arm ö.urdf\"'")
     assert run(*LSV, 'robot.urdf="arm ö.urdf"').code == 0
+
+
+@pytest.mark.parametrize("replaced", [False, True])
+def test_a_lock_file_that_its_owner_takes_away_meanwhile_is_opened_anew(
+    replaced: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    flock, file = fcntl.flock, tmp_path / ownership.LOCK
+
+    def late(lock: int, how: int) -> None:
+        monkeypatch.setattr(fcntl, "flock", flock)
+        file.unlink()
+        if replaced:
+            file.touch()
+        flock(lock, how)
+
+    monkeypatch.setattr(fcntl, "flock", late)
+    ownership.own(tmp_path)
+    try:
+        assert json.loads(file.read_text(encoding="utf-8"))["process"] == os.getpid()
+    finally:
+        ownership.release()

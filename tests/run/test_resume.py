@@ -280,3 +280,15 @@ def test_every_file_that_the_robot_is_read_from_counts(
     (tmp_path / "wrist/parts/hand.sdf").write_text(plain + "<!-- heavier -->")
     after = resume.inputs(config)
     assert {key for key in before if before[key] != after[key]} == {"robot.urdf: wrist/parts/hand.sdf"}
+
+
+def test_files_of_limits_and_documents_of_an_identification_count(tmp_path: Path) -> None:
+    plain = set(resume.inputs(composed()))
+    limits = tmp_path / "limits.yaml"
+    limits.write_text("joint_limits: {}\n", encoding="utf-8")
+    with_limits = resume.inputs(composed(f"limits.file={limits}"))
+    assert set(with_limits) - plain == {"limits.file"}
+    limits.write_text("joint_limits: {joint1: {}}\n", encoding="utf-8")
+    assert resume.inputs(composed(f"limits.file={limits}"))["limits.file"] != with_limits["limits.file"]
+    named = resume.inputs(composed("identification.run=true", "identification.documents=[pmke]"))
+    assert set(named) - plain == {"conf/reproduction/pmke.yaml"}

@@ -31,6 +31,7 @@ def test_a_word_without_effect_is_named(word: str, others: tuple[str, ...], why:
     [
         ("methods=[lsv,pmke]", "method.pmke.dt=0.02", "method.lsv.gain=1"),
         ("methods=[pareto]", "method.global.candidates=9"),
+        ("methods=[lsv]", "candidate_study.run=true", "method.global.candidates=9"),
         ("methods=[global]", "closed_loop.run=true", "closed_loop.bandwidth=3", "export.rate=50"),
         ("+experiment=traj1", "methods=[lsv]", "path.length=0.1"),
     ],

@@ -1,0 +1,46 @@
+"""SIGTERM leads out of a run once, and back to what was there before."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from unittest.mock import Mock
+
+import pytest
+
+from pipeline.run.termination import GRACE, Terminated, terminable
+
+
+@pytest.fixture(autouse=True)
+def before() -> Iterator[object]:
+    """The handler that stood before, and stands again."""
+    handler = signal.getsignal(signal.SIGTERM)
+    yield handler
+    signal.signal(signal.SIGTERM, handler)
+
+
+def test_it_is_raised_once_and_the_end_is_sure(monkeypatch: pytest.MonkeyPatch) -> None:
+    timer = Mock()
+    monkeypatch.setattr("threading.Timer", timer)
+    with pytest.raises(Terminated), terminable():
+        signal.raise_signal(signal.SIGTERM)
+    assert signal.getsignal(signal.SIGTERM) is signal.SIG_IGN
+    timer.assert_called_once_with(GRACE, os._exit, [143])
+    timer.return_value.start.assert_called_once_with()
+
+
+def test_nothing_of_it_stays(before: object) -> None:
+    with terminable():
+        assert signal.getsignal(signal.SIGTERM) is not before
+    assert signal.getsignal(signal.SIGTERM) is before
+
+
+def test_a_thread_beside_the_main_one_is_left_alone() -> None:
+    def within() -> object:
+        with terminable():
+            return signal.getsignal(signal.SIGTERM)
+
+    with ThreadPoolExecutor(1) as pool:
+        assert pool.submit(within).result() is signal.getsignal(signal.SIGTERM)
