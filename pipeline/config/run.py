@@ -16,7 +16,7 @@ from pipeline.config.methods import MethodConfig, MethodName
 from pipeline.config.path import CircleConfig, LineConfig, TimingConfig, WaypointsConfig
 from pipeline.config.robot import FixedBaseConfig, FreeBaseConfig, ObstaclesConfig, RobotConfig
 from pipeline.config.sizes import refuse_overflow
-from pipeline.config.steps import refuse_endless
+from pipeline.config.steps import refuse_endless, refuse_endless_roadmap
 from pipeline.config.studies import CandidateStudyConfig, ClosedLoopConfig, ExportConfig, IdentificationConfig
 
 
@@ -79,6 +79,7 @@ def check(values: Mapping[str, Any]) -> RunConfig:
     """The checked configuration of one run; raises ConfigError naming the key and what is allowed."""
     refuse_overflow(values)
     config = build(RunConfig, values)
+    refuse_endless_roadmap(config)
     if config.timing.law != "from_file":
         refuse_endless(config, config.timing.duration)
     return config
