@@ -25,6 +25,7 @@ from tests.once import made_once
 from tests.support import ROOT
 
 settings.register_profile("project", derandomize=True, deadline=None, max_examples=50)
+settings.register_profile("many", deadline=None, max_examples=1000, print_blob=True, database=None)
 settings.load_profile("project")
 
 

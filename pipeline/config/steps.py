@@ -9,6 +9,7 @@ from pipeline.common.errors import ConfigError
 
 MOST_STEPS = 100_000  # every one is evaluated, drawn and recorded
 MOST_SAMPLES = 1_000_000  # every one is simulated, no more
+MOST_EDGES = 10_000_000  # of a roadmap, or places on its paths: each takes some dozens of bytes
 SHORTEST, LONGEST = 1e-6, 1e9  # [s] of a motion
 STEPS = ("dt", "prediction_step", "update_interval")
 
@@ -39,3 +40,14 @@ def _counts(config: Any, duration: float) -> Iterator[tuple[str, float, float, i
         yield "export.rate", config.export.rate, config.export.rate * duration, MOST_STEPS
     if config.closed_loop.run:
         yield "closed_loop.sampling", config.closed_loop.sampling, config.closed_loop.sampling * duration, MOST_SAMPLES
+
+
+def refuse_endless_roadmap(config: Any) -> None:
+    """Raise ConfigError where the roadmap of method.global has too many edges, or too many and long paths."""
+    nodes, layers = config.method.of("global").nodes, config.method.of("global").layers
+    size = nodes * layers * max(nodes, layers)
+    if size > MOST_EDGES:
+        raise ConfigError(
+            f"method.global.nodes = {nodes}, method.global.layers = {layers}: nodes x layers x the larger is "
+            f"{size:.3g}; at most {MOST_EDGES:.0e}, to fit into memory"
+        )

@@ -14,13 +14,15 @@ from omegaconf.errors import OmegaConfBaseException
 from pipeline.common.errors import InputError
 from pipeline.run import ownership
 from pipeline.run.refusals import in_one_line
-from pipeline.run.termination import CODE, Terminated
+from pipeline.run.termination import CODE, Terminated, insist
 
 HERE = str(Path(__file__).resolve().parents[1])
 
 
 def leaves(error: BaseException) -> bool:
-    """Whether the process was asked to leave: no failure of a run."""
+    """Whether the process was asked to leave: no failure of a run. Raises Terminated where that is hidden."""
+    if isinstance(error, Exception):
+        insist()
     asked = isinstance(error, SystemExit) and not isinstance(error.code, str)
     return asked or isinstance(error, KeyboardInterrupt | Terminated)
 

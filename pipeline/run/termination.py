@@ -34,6 +34,15 @@ def terminable() -> Iterator[None]:
     before = signal.signal(signal.SIGTERM, leave)
     try:
         yield
+    except Exception:
+        insist()
+        raise
     finally:
         if signal.getsignal(signal.SIGTERM) is leave:
             signal.signal(signal.SIGTERM, before)
+
+
+def insist() -> None:
+    """Raise Terminated again where a library has made another error of it: compiled modules do, while they load."""
+    if signal.getsignal(signal.SIGTERM) is signal.SIG_IGN:
+        raise Terminated from None

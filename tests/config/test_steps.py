@@ -12,6 +12,11 @@ ENDLESS = {
     "long": (["methods=[global]", "timing.duration=1e5"], r"export\.rate = 100: 1e\+07 steps"),
     "turn": (["path.turn=[1e9,0,0]"], r"path\.turn\[0\] = 1000000000\.0: must be a number >= -1000 and <= 1000"),
     "starts": (["method.global.optimised=1000000000"], r"method\.global\.optimised = 1000000000: .*<= 100000"),
+    "roadmap": (
+        ["method.global.nodes=10000", "method.global.layers=1000"],
+        r"method\.global\.nodes = 10000, method\.global\.layers = 1000: .* is 1e\+11; at most 1e\+07",
+    ),
+    "layers": (["method.global.layers=1000"], r"nodes = 300, method\.global\.layers = 1000: .* is 3e\+08"),
     "seed": (["seed=100000000000000000000000"], r"seed = .*<= 1"),
     "workers": (["parallel.workers=100000"], r"parallel\.workers = 100000: .*<= 1024"),
 }

@@ -1,16 +1,21 @@
-"""SIGTERM leads out of a run once, and back to what was there before."""
+"""SIGTERM leads out of a run once, also through a library's own error, and back to what was there before."""
 
 from __future__ import annotations
 
 import os
 import signal
+import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from unittest.mock import Mock
 
 import pytest
 
+from pipeline.run import termination
+from pipeline.run.session import Session
 from pipeline.run.termination import GRACE, Terminated, terminable
+from tests.commands import Run
+from tests.endings import SAID
 
 
 @pytest.fixture(autouse=True)
@@ -44,3 +49,22 @@ def test_a_thread_beside_the_main_one_is_left_alone() -> None:
 
     with ThreadPoolExecutor(1) as pool:
         assert pool.submit(within).result() is signal.getsignal(signal.SIGTERM)
+
+
+@pytest.fixture
+def staying(monkeypatch: pytest.MonkeyPatch) -> None:
+    """This process ignores being late."""
+    monkeypatch.setattr(termination, "GRACE", 1e6)
+
+
+def test_while_a_compiled_module_loads(staying: None, monkeypatch: pytest.MonkeyPatch, run: Run) -> None:
+    def loads(*_: object) -> None:
+        try:
+            os.kill(os.getpid(), signal.SIGTERM)
+            time.sleep(0.01)  # where it arrives at the latest
+        except termination.Terminated as error:
+            raise ImportError("initialization failed") from error
+
+    monkeypatch.setattr(Session, "check", loads)
+    answer = run("methods=[lsv]")
+    assert (answer.code, answer.error) == (143, SAID)
