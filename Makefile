@@ -18,7 +18,7 @@ reproduce: $(VENV)/.installed ## every printed number and figure of the three do
 test: $(VENV)/.installed-dev ## set up, then run the whole test suite
 	$(BIN)/python -m pytest --numprocesses 2 --dist worksteal
 
-fast: $(VENV)/.installed-dev ## the tests that take no more than a second or two each
+fast: $(VENV)/.installed-dev ## the tests that take no more than about half a second each
 	$(BIN)/python -m pytest --numprocesses 2 --dist worksteal -m "not slow"
 
 lint: $(VENV)/.installed-dev ## lint, format, types, and which package may import which

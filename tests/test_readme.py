@@ -36,6 +36,7 @@ def _values(word: str) -> list[str]:
     return [f"{key}={one}" for one in value.split(",")] if not value.startswith(("[", "{")) else [word]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", COMMANDS)
 def test_commands_state_a_problem(command: str) -> None:
     words = [word for word in shlex.split(command) if word not in ("-m", "--cfg", "job")]
@@ -57,6 +58,7 @@ def test_every_module_that_is_called_is_checked() -> None:
     assert called == {"pipeline", "pipeline.describe", "pipeline.reproduce"}  # the last: test_reproduction.py
 
 
+@pytest.mark.slow
 def test_python_example_runs(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(ROOT)
     (example,) = re.findall(r"```python\n(.*?)```", TEXTS["README.md"], re.S)

@@ -65,6 +65,7 @@ def everything(name: str, rng: np.random.Generator) -> Problem:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ROBOTS)
 def test_every_row_of_the_program_at_100_random_configurations(name: str, rng: np.random.Generator) -> None:
     """Along random directions, all constraints at once: their Jacobian against central differences."""

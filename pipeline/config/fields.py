@@ -15,6 +15,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import field
 from functools import wraps
+from math import isfinite
 from typing import Annotated, Any, TypeVar, cast, dataclass_transform
 
 from pydantic import (
@@ -37,7 +38,7 @@ from pipeline.config.messages import in_one_line
 
 T = TypeVar("T")
 
-LARGEST = 1e20  # of any number: squares of larger ones leave what a computer counts
+SMALLEST, LARGEST = 1e-30, 1e20  # of any number: squares of others, or of their inverses, leave what a computer counts
 CHECKED = ConfigDict(extra="forbid", validate_by_name=True)
 
 
@@ -89,16 +90,16 @@ WordOrWords = Annotated[Annotated[T, Tag("string")] | Annotated[Words[T], Tag("a
 WordOrVector = Annotated[Annotated[T, Tag("string")] | Annotated[Vector, Tag("array")], Discriminator(_kind)]
 
 
-def _refuse_large(value: Any, where: str) -> None:
-    """Raise ConfigError for the first number in `value`, tables and lists, that is too large to count with."""
+def _refuse_uncountable(value: Any, where: str) -> None:
+    """Raise ConfigError for the first number in `value`, tables and lists, that nobody can count with."""
     if isinstance(value, Mapping):
         for key, inner in value.items():
-            _refuse_large(inner, f"{where}.{key}" if where else str(key))
+            _refuse_uncountable(inner, f"{where}.{key}" if where else str(key))
     elif isinstance(value, list | tuple):
         for index, inner in enumerate(value):
-            _refuse_large(inner, f"{where}[{index}]")
-    elif isinstance(value, float) and LARGEST < abs(value) < float("inf"):
-        raise ConfigError(f"{where} = {value:g}: must be at most {LARGEST:g} in size")
+            _refuse_uncountable(inner, f"{where}[{index}]")
+    elif isinstance(value, float) and value and isfinite(value) and not SMALLEST <= abs(value) <= LARGEST:
+        raise ConfigError(f"{where} = {value:g}: must be 0 or of a size from {SMALLEST:g} to {LARGEST:g}")
 
 
 @dataclass_transform(frozen_default=True, field_specifiers=(Field, field))
@@ -109,7 +110,7 @@ def schema(cls: type[T]) -> type[T]:
 
     @wraps(plain)
     def init(self: Any, *values: Any, **named: Any) -> None:
-        _refuse_large(named, made.__name__)
+        _refuse_uncountable(named, made.__name__)
         try:
             plain(self, *values, **named)
         except ValidationError as error:
@@ -121,7 +122,7 @@ def schema(cls: type[T]) -> type[T]:
 
 def build(cls: type[T], values: Any, where: str = "") -> T:
     """An instance of `cls` from a mapping; raises ConfigError that names the key and what is allowed."""
-    _refuse_large(values, where)
+    _refuse_uncountable(values, where)
     try:
         return TypeAdapter(cls).validate_python(values, by_alias=True, by_name=False)
     except ValidationError as error:

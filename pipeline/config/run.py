@@ -15,7 +15,6 @@ from pipeline.config.goal import BoundaryConfig, KineticEnergyConfig, LimitsConf
 from pipeline.config.methods import MethodConfig, MethodName
 from pipeline.config.path import CircleConfig, LineConfig, TimingConfig, WaypointsConfig
 from pipeline.config.robot import FixedBaseConfig, FreeBaseConfig, ObstaclesConfig, RobotConfig
-from pipeline.config.sizes import refuse_overflow
 from pipeline.config.steps import refuse_endless, refuse_endless_roadmap
 from pipeline.config.studies import CandidateStudyConfig, ClosedLoopConfig, ExportConfig, IdentificationConfig
 
@@ -77,7 +76,6 @@ class RunConfig:
 
 def check(values: Mapping[str, Any]) -> RunConfig:
     """The checked configuration of one run; raises ConfigError naming the key and what is allowed."""
-    refuse_overflow(values)
     config = build(RunConfig, values)
     refuse_endless_roadmap(config)
     if config.timing.law != "from_file":

@@ -81,6 +81,7 @@ def component(file: Path, entity: str, name: str) -> object:
     return [batch[name].to_pylist()[-1] for batch in batches if name in batch.schema.names][-1]
 
 
+@pytest.mark.slow
 def test_every_series_reads_back(case: Case, tmp_path: Path) -> None:
     problem, evaluations = case
     write(tmp_path / "run.rrd", problem, evaluations)
@@ -103,6 +104,7 @@ def test_every_series_reads_back(case: Case, tmp_path: Path) -> None:
         recording.read_series(tmp_path / "run.rrd", "/pmke/joint_position")
 
 
+@pytest.mark.slow
 def test_the_pictures_and_facts_are_there(case: Case, tmp_path: Path) -> None:
     problem, evaluations = case
     file = tmp_path / "run.rrd"

@@ -25,7 +25,12 @@ def words_of(file: Path) -> pd.DataFrame:
 
 def test_a_sweep_leaves_one_table(tmp_path: Path) -> None:
     answer = command(
-        "-m", "+experiment=traj1,traj2", "methods=[lsv]", f"hydra.sweep.dir={tmp_path}/all", folder=tmp_path
+        "-m",
+        "+experiment=traj1,traj2",
+        "methods=[lsv]",
+        "method.lsv.dt=0.05",
+        f"hydra.sweep.dir={tmp_path}/all",
+        folder=tmp_path,
     )
     assert answer.code == 0, answer.error
     assert answer.error == ""

@@ -41,6 +41,7 @@ def test_the_planner_beside_its_peer(name: str, capsys: pytest.CaptureFixture[st
     assert float(re.findall(r"limits kept to (\S+)", out)[0]) < 1e-6
 
 
+@pytest.mark.slow
 def test_a_bound_from_below(capsys: pytest.CaptureFixture[str]) -> None:
     benchmarks.main(["bound", "traj4:6"])
     out = capsys.readouterr().out

@@ -35,7 +35,7 @@ PANDA = ("robot=panda", "path.direction=[0,1,0]", "path.length=0.1")
         ((*FREE, "base.linear_momentum=[0,0,1]"), r"base: a planar arm has linear momentum in x and y"),
         (
             (*FREE, "methods=[dynamic_programming]"),
-            r"dynamic_programming: the base is floating; .* fixed base; "
+            r"dynamic_programming: the base is floating; .* fixed base; .*"
             r"methods that serve this problem: lsv, inertia_weighted, pmke, receding, global, pareto$",
         ),
         (

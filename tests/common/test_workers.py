@@ -44,6 +44,7 @@ def test_no_items_no_calls(tmp_path: Path, count: int | None) -> None:
     assert calls(tmp_path) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [1, 2])
 def test_a_second_map_takes_what_is_kept(tmp_path: Path, count: int) -> None:
     workers, context = Workers(count, tmp_path / "store"), Context(tmp_path, 3.0)
@@ -209,6 +210,7 @@ def test_a_killed_run_goes_on(
         assert {solve["wall_time_s"] for solve in payload.solves} <= times
 
 
+@pytest.mark.slow
 def test_a_killed_worker_process_is_replaced_once(tmp_path: Path) -> None:
     """What was finished is not done again; what kills its process every time is one line."""
     workers = Workers(2, tmp_path / "store")

@@ -55,6 +55,7 @@ def test_what_a_document_says_of_runs_is_of_experiments_that_exist(name: str) ->
     assert all(mention.same_as in ("", *EXPERIMENTS) for mention in document.runs.values())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("experiment", EXPERIMENTS)
 def test_a_printed_number_has_a_method_to_compare_it_with(experiment: str) -> None:
     printed = set(printed_for(experiment).numbers)

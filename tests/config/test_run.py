@@ -118,6 +118,7 @@ def test_every_method_has_its_options() -> None:
         assert type(schema.RunConfig().method.of(name)) is method.options
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("experiment", EXPERIMENTS)
 def test_every_experiment(experiment: str) -> None:
     config = checked(f"+experiment={experiment}")
@@ -132,6 +133,7 @@ def test_an_experiment_starts_with_the_command_that_runs_it(experiment: str) -> 
     assert lines[0] == f"# python -m pipeline +experiment={experiment}"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("experiment", EXPERIMENTS)
 def test_an_experiment_holds_only_differences(experiment: str) -> None:
     """A value that it inherits anyway does not belong there; methods may be said again."""

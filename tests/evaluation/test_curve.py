@@ -36,6 +36,7 @@ def independent_error(problem: Problem, q: Array) -> float:
     return float(np.linalg.norm(problem.task.error(motion, problem.reference.position(t)), axis=1).max())
 
 
+@pytest.mark.slow
 def test_a_grid_too_coarse_for_its_path_is_not_solved_and_the_advised_one_is() -> None:
     problem = prepare(composed(*TWENTY_TURNS))
     judged = evaluate(problem, on_knots(problem))
@@ -64,6 +65,7 @@ def test_the_tolerance_is_that_of_the_configuration() -> None:
     assert "promises its knots alone" in certificate.message
 
 
+@pytest.mark.slow
 def test_a_drift_within_the_promise_is_said() -> None:
     problem = prepare(composed("path.length=0.1", "timing.steps=40"))
     solution = on_knots(problem)

@@ -101,6 +101,7 @@ def test_the_path_error_is_of_second_order_in_the_step() -> None:
     assert np.all((order > 1.8) & (order < 2.4)), order
 
 
+@pytest.mark.slow
 def test_a_base_that_was_moved_is_noticed() -> None:
     """By the tracking of the knots; and the motion that the joints give stays what it was."""
     problem, solution = stated(*ON_BASE)
@@ -165,6 +166,7 @@ def test_an_attitude_that_is_exceeded_is_named() -> None:
     assert relaxed.feasible  # there is a way to turn less
 
 
+@pytest.mark.slow
 def test_a_fine_grid_does_not_make_a_cycle_harder() -> None:
     """Closed joints leave the base turns about the centre of mass alone: rows that these cannot change must go."""
     _, solution = stated(*ON_BASE, *CIRCLE, "timing.steps=100", "method.global.optimised=1")
@@ -327,6 +329,7 @@ PROGRAMS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("elastic", [(), ("attitude", "velocity", "torque")], ids=["hard", "elastic"])
 @pytest.mark.parametrize("kind", PROGRAMS)
 def test_derivatives_of_the_whole_program(kind: str, elastic: tuple[str, ...], rng: np.random.Generator) -> None:

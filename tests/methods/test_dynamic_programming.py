@@ -51,6 +51,7 @@ def test_all_optima_are_among_the_starts(line: Problem) -> None:
         assert np.any((costs > optimum) & (costs < 1.02 * optimum))
 
 
+@pytest.mark.slow
 def test_second_order_from_above(line: Problem) -> None:
     """The excess over the 12-interval optimum is positive and falls with the square of the node spacing."""
     times = np.linspace(0, 1, 13)
@@ -82,6 +83,7 @@ def test_fixed_start(line: Problem) -> None:
     assert 0.0609 < best.statistics["cost"] < 0.0635
 
 
+@pytest.mark.slow
 def test_limits_are_kept(line: Problem, limits: Limits) -> None:
     tight = replace(limits, velocity=np.full(3, 3.2))
     free, limited = (
@@ -104,6 +106,7 @@ def test_impossible_limits(line: Problem, limits: Limits) -> None:
     assert "keeps the limits" in only.message
 
 
+@pytest.mark.slow
 def test_cyclic(line: Problem, limits: Limits) -> None:
     """Global paper, simulation 5 (printed 0.0554), and the cheaper posture that its velocity limit excludes."""
     start = line.task.value(Q_INIT[None])[0]

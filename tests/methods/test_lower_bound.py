@@ -27,6 +27,7 @@ def line() -> Problem:
     return free_line(24)
 
 
+@pytest.mark.slow
 def test_a_motion_its_cost_and_its_bound(line: Problem) -> None:
     (solution,) = lower_bound(line, COARSE)
     found = solution.statistics
@@ -83,6 +84,7 @@ def test_a_stop_before_the_gap_is_closed_says_what_is_open(line: Problem, monkey
     assert percent(solution.statistics["gap"]) in solution.message
 
 
+@pytest.mark.slow
 def test_nothing_to_hold_a_bound_against(line: Problem) -> None:
     limits = replace(line.bounds, velocity=np.full(3, 0.1))
     (solution,) = lower_bound(replace(line, limits=limits), COARSE)

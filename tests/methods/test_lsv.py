@@ -22,6 +22,7 @@ def drift(problem: Problem, solution: Solution) -> float:
     return float(evaluate(problem, solution).tracking_error.max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("integrator", "order"), [("euler", 1), ("heun", 2)])
 @pytest.mark.parametrize("number", [1, 2])
 def test_order_of_the_integrator(problem: Make, integrator: str, order: int, number: int) -> None:
@@ -91,6 +92,7 @@ def test_a_singularity_has_its_time(problem: Make) -> None:
     assert f"{solution.event_time:.2f} s" in solution.message
 
 
+@pytest.mark.slow
 def test_the_threshold_decides_what_is_singular(problem: Make) -> None:
     asked = problem(1, 100)
     calm = lsv(asked)[0]

@@ -95,6 +95,7 @@ def test_weighting_gives_points_that_the_epsilon_constraint_does_not_beat(
     assert not front.dominated(both)[len(table) :].any()
 
 
+@pytest.mark.slow
 def test_a_bounded_integral_is_met_exactly(problem: Problem) -> None:
     """Bound the energy between its optimum and what the least torques need: the bound binds."""
     start = global_planner(problem, replace(FEW, optimised=2))[0].trajectory.q

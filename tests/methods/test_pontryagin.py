@@ -59,6 +59,7 @@ def extremals(case: str, boundary: str) -> list[Solution]:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("case", "dt", "error", "end"),
     [

@@ -37,6 +37,7 @@ def test_motions_that_get_stuck_do_not_move_the_path_out_of_reach() -> None:
     assert "reach" not in only.message
 
 
+@pytest.mark.slow
 def test_a_path_out_of_reach_is_said_with_where_and_by_how_much() -> None:
     problem = stated("timing.steps=20", "timing=constant_speed", "timing.duration=2")
     start = problem.reference.position(np.zeros(1))[0]

@@ -40,7 +40,11 @@ SMALL = (
     *("method.dynamic_programming.nodes=60", "method.dynamic_programming.intervals=6"),
     *("method.lower_bound.intervals=6", "method.lower_bound.cells=30"),
     *("method.calculus_of_variations.spacing=0.3", "method.calculus_of_variations.refinements=1"),
-    *("method.calculus_of_variations.max_speed=0.5", "method.pontryagin.guesses=2", "method.pontryagin.intervals=10"),
+    *(
+        "method.calculus_of_variations.max_speed=0.5",
+        "method.pontryagin.guesses=2",
+        "method.pontryagin.intervals=10",
+    ),
 )
 CIRCLE = tuple(word for word in SMALL if not word.startswith("path."))
 PROBLEMS = {

@@ -24,6 +24,7 @@ from tests.support import composed, free_line
 FEW = GlobalOptions(starts="population", configurations=12, candidates=60, optimised=3)
 
 
+@pytest.mark.slow
 def test_rest_asks_for_a_spline_and_differences_refuse_it() -> None:
     problem = replace(free_line(12), rest=(True, True))
     (best, *_) = global_planner(problem, FEW)
@@ -48,6 +49,7 @@ def test_a_start_that_the_grid_does_not_show_is_said() -> None:
     assert unresolved(replace(problem, boundary=Boundary.FREE), motion) == ""
 
 
+@pytest.mark.slow
 def test_a_spline_is_judged_as_the_curve_that_it_is() -> None:
     """Its velocities, accelerations and integrals are the curve's: recomputed here by SciPy and the stacked arm."""
     problem = replace(free_line(20), rest=(True, True))

@@ -48,10 +48,8 @@ def off(problem: Problem, motion: Evaluation, until: float) -> Array:
     return np.asarray(np.linalg.norm(error[:, : len(problem.task.axes)], axis=1))
 
 
-SLOW = ("variations", "principle", "front", "floating", "held", "held, quick")
-
-
-@pytest.mark.parametrize("row", [pytest.param(row, marks=[pytest.mark.slow] * (row in SLOW)) for row in TABLE])
+@pytest.mark.slow
+@pytest.mark.parametrize("row", TABLE)
 def test_what_is_solved_is_on_its_path_or_says_how_far_it_is(row: str) -> None:
     words, methods = TABLE[row]
     config = composed(*words)

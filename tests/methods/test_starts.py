@@ -75,6 +75,7 @@ def test_distinct_optima_their_members_and_the_starts_that_brought_nothing_new()
     assert (jumping.optima, jumping.jumping) == ([], 2)
 
 
+@pytest.mark.slow
 def test_drawing_ends_when_half_of_the_starts_brought_nothing_new_or_with_the_budget() -> None:
     problem = prepare(composed("+experiment=traj3", "timing.steps=25"))
     options = GlobalOptions(nodes=60, optimised=8)

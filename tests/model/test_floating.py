@@ -142,6 +142,7 @@ def test_generalized_jacobian_and_reduced_inertia(arm: Arm, rng: np.random.Gener
         np.testing.assert_allclose(arm.inverse_inertia(q[i : i + 1])[0], inverse, rtol=1e-8, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_derivatives_equal_central_differences(arm: Arm, rng: np.random.Generator) -> None:
     q, qd = states(arm, 100, rng)
     h, units = 1e-6, np.eye(arm.n)
@@ -225,6 +226,7 @@ def test_a_held_base_stands_still(rng: np.random.Generator) -> None:
     np.testing.assert_allclose(arm.reduced_inertia(q), arm.mass_matrix(q)[:, 6:, 6:])
 
 
+@pytest.mark.slow
 def test_simulation_under_internal_torques() -> None:
     """Two seconds of Drake's Simulator: what is between the joints changes no momentum, and the base does as B says."""
     arm = on_craft("panda")

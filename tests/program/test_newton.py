@@ -256,6 +256,7 @@ def solved(*words: str) -> tuple[Problem, Newton, Array]:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["sim1", "sim2", "sim5", "traj4", "panda_pose"])
 def test_ipopt_confirms_every_optimum(name: str) -> None:
     problem, newton, starts = solved(f"+experiment={name}")
@@ -334,6 +335,7 @@ def test_limits_that_nothing_keeps_are_not_kept_silently() -> None:
     assert not answer.converged.any()
 
 
+@pytest.mark.slow
 def test_what_is_not_served_has_a_reason() -> None:
     for name in ("sim4", "floating3r"):
         assert why_not(prepare(composed(f"+experiment={name}"))) is None

@@ -218,6 +218,7 @@ def test_running_out_of_time_is_called_so(made: Program) -> None:
     assert "time" in outcome.status
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("elastic", [(), ("velocity",)])
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_program_is_gone_when_nobody_has_it(kind: str, elastic: tuple[str, ...], problem: Make, guess: Guess) -> None:

@@ -19,12 +19,12 @@ PLANAR = (ROOT / "robots" / "planar3r.urdf").read_text()
 @pytest.mark.parametrize(
     ("words", "line"),
     [
-        ("path.length=1e200", r"path\.length = 1e\+200: must be at most 1e\+20 in size"),
-        ("path.direction=[1e200,1e200]", r"path\.direction\[0\] = 1e\+200: must be at most"),
+        ("path.length=1e200", r"path\.length = 1e\+200: must be 0 or of a size from 1e-30 to 1e\+20"),
+        ("path.direction=[1e200,1e200]", r"path\.direction\[0\] = 1e\+200: must be 0 or of a size"),
         ("gravity=[0,0,1e300]", r"gravity\[2\] = 1e\+300"),
         ("robot.locked={joint1:1e300}", r"robot\.locked\.joint1 = 1e\+300"),
         ("robot.q_init=[1e9,0,0]", r"robot\.q_init\[0\] = .*: must be a number >= -10000 and <= 10000"),
-        ("timing.duration=1e-300", r"timing\.duration = 1e-300 s: a motion takes 1e-06 to 1e\+09 s"),
+        ("timing.duration=1e-9", r"timing\.duration = 1e-09 s: a motion takes 1e-06 to 1e\+09 s"),
         ("timing.duration=1e10", r"timing\.duration = 1e\+10 s: a motion takes"),
         ("base=free base.inertia=[1,2,2]", r"base\.inertia = .*: that of a spacecraft; give its base\.mass too"),
         ("base=free base.com=[0,0,1]", r"base\.com = .*: that of a spacecraft"),
@@ -36,7 +36,7 @@ def test_the_key_is_named(words: str, line: str) -> None:
 
 
 def test_from_python_too() -> None:
-    with pytest.raises(InputError, match=r"LineConfig\.length = 1e\+200: must be at most"):
+    with pytest.raises(InputError, match=r"LineConfig\.length = 1e\+200: must be 0 or of a size"):
         LineConfig(length=1e200)
 
 

@@ -107,6 +107,7 @@ def test_bad_way_points(name: str, run: Run, tmp_path: Path) -> None:
     assert [file.name for file in tmp_path.iterdir()] == ["points.csv"]
 
 
+@pytest.mark.slow
 def test_a_path_that_leaves_the_reach_says_where_and_by_how_much(run: Run) -> None:
     """The numbers of the message are those of the arm's length."""
     task = prepare(config.RunConfig()).task
@@ -192,6 +193,7 @@ def test_bad_input_as_a_process(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_a_table_that_is_given_whole_names_the_entry_that_is_not_known(
     monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:

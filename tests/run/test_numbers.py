@@ -27,6 +27,7 @@ def solved(number: int, method: str) -> tuple[Problem, list[Evaluation]]:
     return problem, [evaluate(problem, solution) for solution in solutions]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("number", "energy"), [(1, 8.81e-4), (2, 5.37e-3), (4, 5.17e-2)])
 def test_lsv(number: int, energy: float) -> None:
     (motion,) = solved(number, "lsv")[1]
@@ -41,6 +42,7 @@ def test_lsv_meets_a_singularity_on_trajectory_3() -> None:
     assert motion.solution.event_time == pytest.approx(6.5, abs=0.1)
 
 
+@pytest.mark.slow
 def test_lsv_peaks() -> None:
     peaks = [np.abs(solved(number, "lsv")[1][0].qd).max(axis=0) for number in (1, 4)]
     assert peaks[0][[0, 2]] == pytest.approx([0.063, 0.197], abs=6e-4)
@@ -64,6 +66,7 @@ def test_pmke_is_at_most_one_percent_above_the_paper(number: int, energy: float)
     assert motion.energy_integral_spline > 0.99 * solved(number, "global")[1][0].energy_integral_spline
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("number", "energy"), [(1, 5.97e-4), (2, 3.87e-3), (3, 6.09e-3), (4, 3.03e-2)])
 def test_global(number: int, energy: float) -> None:
     problem, motions = solved(number, "global")

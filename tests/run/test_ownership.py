@@ -51,6 +51,7 @@ def left(folder: Path) -> set[str]:
     return {str(file.relative_to(folder)) for file in folder.rglob("*")}
 
 
+@pytest.mark.slow
 def test_a_folder_in_use_is_refused_and_untouched_and_that_of_a_dead_process_is_taken_over(
     run: Run, tmp_path: Path
 ) -> None:
@@ -83,6 +84,7 @@ def test_a_lock_without_a_name_is_taken(content: str, tmp_path: Path) -> None:
     assert left(tmp_path) == set()
 
 
+@pytest.mark.slow
 def test_the_results_of_another_configuration_are_not_lost(run: Run, tmp_path: Path) -> None:
     assert run(*LSV, "hydra.run.dir=out").code == 0
     record = (tmp_path / "out" / "run.json").read_bytes()
@@ -91,6 +93,7 @@ def test_the_results_of_another_configuration_are_not_lost(run: Run, tmp_path: P
     assert run(*LSV, "parallel.workers=1", "hydra.run.dir=out").code == 0
 
 
+@pytest.mark.slow
 def test_runs_of_one_second_have_folders_of_their_own(run: Run, tmp_path: Path) -> None:
     for _ in range(3):
         assert run(*LSV).code == 0
@@ -120,6 +123,7 @@ def test_what_cannot_be_a_place_is_refused(case: str, run: Run, tmp_path: Path) 
     assert not [name for name in left(tmp_path) if "summary" in name or ".lock" in name]
 
 
+@pytest.mark.slow
 def test_a_sweep_whose_runs_turn_out_to_share_a_folder(run: Run, tmp_path: Path) -> None:
     answer = run("-m", *LSV, "seed=1,2", "hydra.sweep.dir=all", "hydra.sweep.subdir=${name}")
     assert_refused(answer, "two runs of the sweep share it", "hydra.sweep.subdir")

@@ -119,6 +119,7 @@ def test_a_run_that_is_finished_but_not_confirmed_is_not_made_better_by_skipping
     assert (answer.code, skipped(answer)) == (1, ["0_traj1"])
 
 
+@pytest.mark.slow
 def test_runs_of_an_earlier_sweep_are_not_in_the_table(again: Sweep, tmp_path: Path) -> None:
     assert again("path.length=0.1").code == 0
     assert list(table(tmp_path)["run"]) == ["0_traj1"]
@@ -165,6 +166,7 @@ def test_a_crash_of_a_single_run_is_not_hidden(
     assert "in crash" in (tmp_path / "out" / "error.txt").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("error", "code", "line"),
     [
@@ -195,6 +197,7 @@ def test_what_ends_a_run_is_a_line_and_a_row(
     assert line in rows["message"][0]
 
 
+@pytest.mark.slow
 def test_a_run_in_a_process_of_a_launcher_does_not_take_all_cores_for_itself() -> None:
     assert Workers(None)._count() == cpu_count()
     with parallel_config(backend="loky"):

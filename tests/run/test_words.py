@@ -73,6 +73,7 @@ def test_a_path_of_two_way_points_is_a_line(points: Callable[[Any], Path]) -> No
     assert problem.reference.geometry.length == pytest.approx(np.linalg.norm(ROWS[1] - ROWS[0]), rel=1e-12)
 
 
+@pytest.mark.slow
 def test_a_path_can_say_where_it_starts() -> None:
     problem = prepared("path.start=[0.40,0.05]", "path.length=0.1")
     moved = problem.task.value(problem.q_init[None])[0]

@@ -77,6 +77,7 @@ def covered(case: Case, incumbent: float, rounds: int) -> list[Cover]:
     return found
 
 
+@pytest.mark.slow
 def test_no_known_motion_costs_less_and_the_best_costs_little_more(case: Case) -> None:
     """At every round, whatever the incumbent; the last one is tight, so that a bound a little too high would fail."""
     best = case.cost[0]

@@ -35,6 +35,7 @@ def test_cheapest_paths_beside_enumeration(rng: np.random.Generator) -> None:
         assert (tuple(map(int, path)), cost) == (best, pytest.approx(every[best], rel=1e-6))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["sim2", "traj4", "sim5", "panda_pose"])
 def test_starts_keep_path_limits_and_boundary(name: str) -> None:
     problem = prepare(composed(f"+experiment={name}", "timing.steps=12"))
@@ -86,6 +87,7 @@ def test_joints_without_limits_go_the_shorter_way_round() -> None:
     np.testing.assert_allclose(limited.wrap(np.array([6.0, -6.0, 1.0])), [6.0, -6.0, 1.0])
 
 
+@pytest.mark.slow
 def test_a_stretched_start_is_left_on_both_sides() -> None:
     """At q = 0 the planar arm is straight and its Jacobian has lost a rank along the path."""
     words = ("robot=planar3r", "robot.q_init=[0,0,0]", "path=line", "path.length=0.15", "path.direction=180")

@@ -60,6 +60,7 @@ def components(distance: float) -> int:
     return int((np.diff(np.append(inside, inside[0]).astype(int)) == 1).sum())
 
 
+@pytest.mark.slow
 @settings(max_examples=25, deadline=None, derandomize=True)
 @given(st.floats(0.02, 0.48), st.floats(-np.pi, np.pi))
 def test_every_component_is_found_and_closed(planar: PositionTask, distance: float, angle: float) -> None:

@@ -22,6 +22,7 @@ def curve(line: Problem) -> Candidates:
     return measure(line, OPTIMUM, GlobalOptions(configurations=12), CandidateStudyConfig(most=600, repeats=3), seed=1)
 
 
+@pytest.mark.slow
 def test_more_candidates_come_nearer(curve: Candidates) -> None:
     assert (np.diff(curve.distance) <= 1e-12).all()
     assert curve.distance[-1] < 0.5 * curve.distance[0]

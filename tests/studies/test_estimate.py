@@ -42,6 +42,7 @@ def compared(line: Problem, optima: list[Solution], on_grid: list[Solution]) -> 
     return estimate.compare(line, optima, on_grid, OPTIONS, Context())
 
 
+@pytest.mark.slow
 def test_the_same_motion_is_recognised_and_no_bound_is_claimed(
     line: Problem, optima: list[Solution], on_grid: list[Solution]
 ) -> None:

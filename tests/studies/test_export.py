@@ -75,6 +75,7 @@ def assert_consistent(motion: Resampled) -> None:
         assert np.abs(by_difference - rate[1:-1]).max() < 2e-3 * scale
 
 
+@pytest.mark.slow
 def test_derivatives_are_those_of_the_positions(line: Case, cycle: Case) -> None:
     assert_consistent(resample(*line, 2000.0))
     assert_consistent(resample(*cycle, 2000.0))

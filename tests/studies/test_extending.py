@@ -68,6 +68,7 @@ WORDS = (
 )
 
 
+@pytest.mark.slow
 def test_a_new_study_arrives_in_every_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(figures, "FIGURES", {})  # those of the motions take most of the time
     monkeypatch.setattr(run, "STUDIES", (*STUDIES, study))

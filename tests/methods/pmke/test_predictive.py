@@ -116,6 +116,7 @@ def test_a_gain_too_large_for_the_step_is_refused(problem: Make) -> None:
         pmke(problem(1, 100), PmkeOptions(dt=0.02, gain=100.0))
 
 
+@pytest.mark.slow
 def test_the_gain_takes_the_drift_away(problem: Make) -> None:
     asked = problem(2, 100)
     free, held = (
