@@ -82,6 +82,7 @@ def test_a_result_that_is_nothing_is_kept_too(tmp_path: Path) -> None:
     assert calls(tmp_path) == [1.0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [1, 2])
 def test_what_was_finished_before_an_error_is_kept(tmp_path: Path, count: int) -> None:
     workers, context = Workers(count, tmp_path / "store"), Context(tmp_path)

@@ -89,6 +89,7 @@ def test_the_files_hold_every_key_of_the_schema() -> None:
     assert keys(own) == keys(defaults)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("option", OPTIONS)
 def test_every_option_of_every_group(option: str) -> None:
     group, _, name = option.partition("=")

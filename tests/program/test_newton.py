@@ -183,6 +183,7 @@ def test_clearance_rows_are_drakes(rng: np.random.Generator) -> None:
     np.testing.assert_array_equal(rows.values(x, x)[1], kept)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("boundary", BOUNDARIES)
 @pytest.mark.parametrize("enters", ["rest", "speed", "velocity"])
 def test_derivatives_of_torques(boundary: Boundary, enters: str, rng: np.random.Generator) -> None:

@@ -86,6 +86,7 @@ def vector(made: Program, q: Array, qd: Array) -> Array:
     return np.concatenate([POSITION_SCALE * q.ravel(), w.ravel()])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("intervals", [6, 25])
 @pytest.mark.parametrize("kind", KINDS)
 def test_derivatives_of_the_whole_program_equal_central_differences(

@@ -73,6 +73,7 @@ def test_a_file_of_a_configuration_that_holds_something_else(case: str, run: Run
     assert [file.name for file in tmp_path.iterdir()] == ["mine"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "words",
     [

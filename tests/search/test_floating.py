@@ -42,6 +42,7 @@ def test_metrics_are_the_objectives_own(rng: np.random.Generator) -> None:
     assert np.trace(rest, axis1=1, axis2=2).mean() == pytest.approx(0.1 * np.trace(by_joints, axis1=1, axis2=2).mean())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "words",
     [

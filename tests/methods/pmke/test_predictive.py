@@ -35,6 +35,7 @@ def predictions(monkeypatch: pytest.MonkeyPatch) -> Seen:
     return seen
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("interpolation", ["quintic", "cubic"])
 @pytest.mark.parametrize("horizon", [1, 2, 5])
 def test_predictions_are_on_the_path_and_join_the_motion(
