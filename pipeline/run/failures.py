@@ -57,8 +57,8 @@ def told(error: BaseException) -> tuple[str, int]:
             return f"not a table of keys and values: {_joined(error)}", 2
         case OSError():  # a disk that is full has no name of its own
             return f"cannot write{ownership.names()}: {error.strerror}", 2
-        case ValueError() if re.search(r"[/\\](omegaconf|hydra|antlr4)[/\\]", _last(error)):
-            # Hydra lets some malformed overrides through to a bare ValueError.
+        case ValueError() | TypeError() if re.search(r"[/\\](omegaconf|hydra|antlr4)[/\\]", _last(error)):
+            # Hydra lets some malformed overrides through to a bare error, as a list of numbers that picks an option.
             return f"{' '.join(sys.argv[1:])}: {_joined(error)}", 2
     return f"{type(error).__name__}: {_joined(error)}", 1
 

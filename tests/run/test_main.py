@@ -27,6 +27,7 @@ REFUSED = {
     "closest option": (["robot=pandda"], ["robot = pandda", "did you mean panda?"]),
     "plus forgotten": (["experiment=traj3"], ["experiment=traj3", "did you mean +experiment=traj3?"]),
     "group": (["paths=line"], ["paths", "did you mean path"]),
+    "numbers for an option": (["boundary=[1,2]"], ["boundary=[1,2]: "]),
     "key": (["sed=2"], ["sed", "did you mean seed", "methods"]),
     "appended key": (["+sed=2"], ["sed", "did you mean seed", "methods"]),
     "nested key": (["path.lenght=0.2"], ["path.lenght", "did you mean length", "direction", "start"]),
