@@ -26,10 +26,8 @@ from pipeline.program.transcription import transcribe
 from tests.program.test_program import program_jacobian, program_value
 from tests.support import composed
 
-FEW = tuple(
-    f"method.global.{key}"
-    for key in ("starts=population", "configurations=8", "candidates=100", "optimised=2", "refine_to=null")
-)
+SIZES = ("starts=population", "configurations=8", "candidates=100", "optimised=2", "refine_to=null")
+FEW = tuple(f"method.global.{key}" for key in SIZES)
 SHORT = ("timing.duration=4", "timing.steps=30", *FEW)
 BETWEEN = "path.tolerance=1e-3"  # the grids are coarse
 ON_BASE = ("robot=planar3r_base", "base=free", BETWEEN, *SHORT)

@@ -289,18 +289,24 @@ def test_ipopt_confirms_an_optimum_beside_an_obstacle() -> None:
     assert 0.0 <= clearance.min() - problem.obstacles.margin < 1e-3  # the obstacle is in the way; p is a smooth bound
 
 
+def best_confirmed(problem: Problem, nodes: int, most: int) -> Array:
+    """The best of a few starts (N + 1, n), which IPOPT leaves where it is after `most` iterations at most."""
+    starts = Roadmap(problem, problem.times, np.random.default_rng(1), nodes=nodes).cheapest(4)
+    answer = Solver(problem).on(problem.times).solve(starts)
+    assert answer.converged.any()
+    q: Array = answer.q[np.flatnonzero(answer.converged)[np.argmin(answer.cost[answer.converged])]]
+    told = confirm(problem, problem.times, q, tolerance=1e-8, max_iterations=20)
+    assert told.converged
+    assert told.iterations <= most
+    assert told.moved < 1e-6
+    return q
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("words", [("base.angular_momentum=[0,0,0.02]",), ("limits=joint",)])
 def test_ipopt_confirms_optima_of_an_arm_that_floats(words: tuple[str, ...]) -> None:
     problem = prepare(composed("+experiment=floating3r", "timing.steps=12", *words))
-    starts = Roadmap(problem, problem.times, np.random.default_rng(1), nodes=60).cheapest(4)
-    answer = Solver(problem).on(problem.times).solve(starts)
-    assert answer.converged.any()
-    q = answer.q[np.flatnonzero(answer.converged)[np.argmin(answer.cost[answer.converged])]]
-    told = confirm(problem, problem.times, q, tolerance=1e-8, max_iterations=20)
-    assert told.converged
-    assert told.iterations <= 2
-    assert told.moved < 1e-6
+    best_confirmed(problem, nodes=60, most=2)
 
 
 @pytest.mark.slow
@@ -308,14 +314,7 @@ def test_ipopt_confirms_optima_of_an_arm_that_floats(words: tuple[str, ...]) -> 
 def test_ipopt_confirms_optima_of_torques(name: str) -> None:
     """Squares of torques, and in sim4 limits of torques and powers that matter."""
     problem = prepare(composed(f"+experiment={name}", "timing.steps=25"))
-    starts = Roadmap(problem, problem.times, np.random.default_rng(1), nodes=100).cheapest(4)
-    answer = Solver(problem).on(problem.times).solve(starts)
-    assert answer.converged.any()
-    q = answer.q[np.flatnonzero(answer.converged)[np.argmin(answer.cost[answer.converged])]]
-    told = confirm(problem, problem.times, q, tolerance=1e-8, max_iterations=20)
-    assert told.converged
-    assert told.iterations <= 4
-    assert told.moved < 1e-6
+    q = best_confirmed(problem, nodes=100, most=4)
     tau, qd = np.abs(integrals(problem, problem.times, q).tau), np.abs(velocities(problem, problem.times, q))
     most = max((tau / problem.bounds.torque).max(), (tau * qd / problem.bounds.power).max())
     assert most == pytest.approx({"sim3": 0.0, "sim4": 1.0}[name], abs=1e-6)
