@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 import pandas as pd
 from rich.console import Console as RichConsole
+from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
 from rich.progress import Progress as Bar
 from rich.table import Table
 
 from pipeline.problem.solution import Progress
+from pipeline.studies.study import Result
 
 LINE_EVERY = 0.25  # of the work, where there is no terminal to draw a bar on
 
@@ -53,7 +55,8 @@ class Console:
 
         return show
 
-    def report(self, summary: pd.DataFrame, folder: Path) -> None:
+    def report(self, summary: pd.DataFrame, results: Iterable[Result], folder: Path) -> None:
+        """The table of the motions, what there is to say of each, what the studies say, and where it all lies."""
         table = Table(box=None, header_style="bold")
         for title in (
             "method",
@@ -63,7 +66,7 @@ class Console:
             "error [m]",
             "time [s]",
         ):
-            table.add_column(title, no_wrap=True, justify="left" if title in ("method", "status") else "right")
+            table.add_column(escape(title), no_wrap=True, justify="left" if title in ("method", "status") else "right")
         for row in summary.to_dict("records"):
             label = row["method"] if row["optimum"] == 1 else f"{row['method']} {row['optimum']}"
             figures = [f"{row[key]:.5g}" for key in ("kinetic_energy_integral", "torque_integral")]
@@ -76,4 +79,6 @@ class Console:
                 self.console.print(f"{row['method']}: {row['message']}", soft_wrap=True)
             if row["evidence"] and row["optimum"] == 1:
                 self.console.print(f"{row['method']}: {row['evidence']}", soft_wrap=True)
+        for line in (line for result in results for line in result.said()):
+            self.console.print(line, soft_wrap=True, markup=False)
         self.console.print(f"results in {folder}", soft_wrap=True)

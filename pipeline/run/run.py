@@ -43,7 +43,7 @@ def run(config: RunConfig, folder: Path) -> int:
         with stages(name(artifact)):
             artifact(report, folder)
     shutil.rmtree(folder / UNFINISHED, ignore_errors=True)
-    console.report(summary(report), folder)
+    console.report(summary(report), results, folder)
     return report.exit_code
 
 

@@ -60,6 +60,9 @@ class Resampled(Result):
     def section(self) -> list[str]:
         return [f"Exported: {sentence(self)}."]
 
+    def said(self) -> list[str]:
+        return self.section()
+
     def columns(self, motion: Evaluation) -> Mapping[str, Any]:
         if (motion.method, motion.solution.optimum) != (self.method, self.optimum):
             return {}
@@ -95,6 +98,9 @@ class Nothing(Result):
             f"Exported: nothing, since no confirmed motion can be sent: {'; '.join(named)}{others}. {WAY_OUT}; "
             "export.force=true writes the cheapest all the same."
         ]
+
+    def said(self) -> list[str]:
+        return self.section()
 
     def facts(self) -> Mapping[str, Any]:
         return {"refused": {f"{motion.method} {motion.optimum}": list(motion.faults) for motion in self.refused}}

@@ -67,6 +67,10 @@ class Result:
         """Its lines of Markdown in summary.md and in the recording."""
         return []
 
+    def said(self) -> list[str]:
+        """Its lines on the terminal, at the end of a run."""
+        return []
+
     def columns(self, motion: Evaluation) -> Mapping[str, Any]:
         """What it adds to the row of `motion` in summary.csv, by column."""
         return {}

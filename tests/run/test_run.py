@@ -54,6 +54,8 @@ class TestTraj3:
         assert answer.code == 0, answer.error
         assert answer.error == ""
         assert "singular" in answer.out
+        assert "error [m]" in answer.out  # units are no markup
+        assert "Exported: " in answer.out
         assert str(folder) in answer.out
 
     def test_every_file_of_the_contract(self, traj3: tuple[Answer, Path]) -> None:
