@@ -145,6 +145,7 @@ def test_a_bound_on_the_attitude() -> None:
     bounded = solved(*ON_BASE, f"limits.attitude={most}")[1]
     assert bounded.status is Status.SOLVED
     assert bounded.base.turn.max() == pytest.approx(most, rel=1e-5)
+    assert bounded.limit_excess_between["attitude"] == pytest.approx(0.0, abs=5e-3)
     assert bounded.energy_integral[-1] > free.energy_integral[-1]
     assert free.limit_excess == {}
 
