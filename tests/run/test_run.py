@@ -155,7 +155,7 @@ def test_the_verdict_comes_before_what_is_drawn(
     monkeypatch.setattr(run_module, "write", full)
     words = ("methods=[lsv]", "timing.steps=4", "method.lsv.dt=0.5", "path.length=0.05", "export.method=none")
     answer = call(monkeypatch, capfd, *words, "hydra.run.dir=results")
-    assert (answer.code, answer.error) == (2, "error: summary.md: No space left on device\n")
+    assert (answer.code, answer.error) == (2, "error: cannot read or write summary.md: No space left on device\n")
     assert "lsv" in answer.out
     assert "results in" not in answer.out
 
