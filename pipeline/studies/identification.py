@@ -46,7 +46,7 @@ from pipeline.robot.description import Description
 from pipeline.studies import style
 from pipeline.studies.study import Motions, Result
 
-FEW = GlobalOptions(starts="population", candidates=200, optimised=12)
+FEW = GlobalOptions(starts="population", candidates=60, optimised=12)
 ROUNDS = 5  # of fits, at most, each from the optima at the masses of the one before
 SETTLED = 1e-4  # relative: masses that change less are found
 STEP = 1e-3  # relative, of the differences by the masses
