@@ -14,7 +14,7 @@ from pipeline.model.kernel.chain import Chain
 from pipeline.problem.costs import integrals, objective_values, velocities
 from pipeline.problem.objective import Objective
 from pipeline.problem.problem import Boundary, Problem
-from pipeline.program.confirm import confirm
+from pipeline.program.confirm import Confirm
 from pipeline.program.newton import stencils, triangular
 from pipeline.program.newton.banded import Banded
 from pipeline.program.newton.bounds import Bounds
@@ -265,7 +265,7 @@ def test_ipopt_confirms_every_optimum(name: str) -> None:
     assert answer.converged.sum() > 5
     costs = answer.cost[answer.converged]
     for s in np.flatnonzero(answer.converged)[[np.argmin(costs), np.argmax(costs)]]:
-        told = confirm(problem, problem.times, answer.q[s], tolerance=1e-8, max_iterations=20)
+        told = Confirm(problem, problem.times, 1e-8, 20)(answer.q[s], answer.cost[s])
         assert told.converged
         assert told.iterations <= 2
         assert told.moved < 1e-6
@@ -279,8 +279,9 @@ def test_ipopt_confirms_an_optimum_beside_an_obstacle() -> None:
     starts = Roadmap(problem, problem.times, np.random.default_rng(1), nodes=60).cheapest(4)
     answer = Solver(problem).on(problem.times).solve(starts)
     assert answer.converged.sum() >= 2
-    q = answer.q[np.flatnonzero(answer.converged)[np.argmin(answer.cost[answer.converged])]]
-    told = confirm(problem, problem.times, q, tolerance=1e-8, max_iterations=20)
+    best = np.flatnonzero(answer.converged)[np.argmin(answer.cost[answer.converged])]
+    q = answer.q[best]
+    told = Confirm(problem, problem.times, 1e-8, 20)(q, answer.cost[best])
     assert told.converged
     assert told.iterations <= 5
     assert told.moved < 1e-6
@@ -294,8 +295,9 @@ def best_confirmed(problem: Problem, nodes: int, most: int) -> Array:
     starts = Roadmap(problem, problem.times, np.random.default_rng(1), nodes=nodes).cheapest(4)
     answer = Solver(problem).on(problem.times).solve(starts)
     assert answer.converged.any()
-    q: Array = answer.q[np.flatnonzero(answer.converged)[np.argmin(answer.cost[answer.converged])]]
-    told = confirm(problem, problem.times, q, tolerance=1e-8, max_iterations=20)
+    best = np.flatnonzero(answer.converged)[np.argmin(answer.cost[answer.converged])]
+    q: Array = answer.q[best]
+    told = Confirm(problem, problem.times, 1e-8, 20)(q, answer.cost[best])
     assert told.converged
     assert told.iterations <= most
     assert told.moved < 1e-6
@@ -344,3 +346,20 @@ def test_what_is_not_served_has_a_reason() -> None:
     assert "obstacles and torques" in str(why_not(obstacle))
     for words, word in ((("boundary=free",), "not fixed"), (("objective=base_rotation",), "rotation")):
         assert word in str(why_not(prepare(composed("+experiment=floating3r", *words))))
+
+
+def test_starts_that_will_be_dear_are_given_up() -> None:
+    """Earlier than they converge, and none but those; what is cheap ends as it does without."""
+    problem = prepare(composed("+experiment=sim1", "timing.steps=12"))
+    starts = Roadmap(problem, problem.times, np.random.default_rng(1), nodes=60).random(48)
+    newton = Solver(problem).on(problem.times)
+    whole = newton.solve(starts)
+    most = 1.5 * whole.cost[whole.converged].min()
+    some = newton.solve(starts, dear=most)
+    assert 5 < some.dear.sum() < 43
+    assert not (some.dear & some.converged).any()
+    assert (whole.cost[some.dear] > most).all()
+    assert some.iterations[some.dear].sum() < 0.9 * whole.iterations[some.dear].sum()
+    cheap = whole.converged & (whole.cost < most)
+    assert some.converged[cheap].all()
+    np.testing.assert_allclose(some.cost[cheap], whole.cost[cheap], rtol=1e-10)

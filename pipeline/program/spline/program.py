@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -75,7 +76,7 @@ class Spline(Lifted):
                 knot for knot, rests in zip((1, self.intervals - 1), problem.rest, strict=True) if rests
             )
 
-    def solve(self, **options: object) -> Solved:
+    def solve(self, **options: Any) -> Solved:
         """Solve from the guess."""
         outcome, iterations = self.run(**options)
         q, v, a = (self.read(outcome, unknowns) for unknowns in (self.y, self.v, self.a))
