@@ -17,8 +17,8 @@ def check_rest(problem: Problem) -> None:
     bounds, cyclic = problem.bounds, problem.boundary is Boundary.CYCLIC
     if any(problem.rest) and not problem.reference.timing.at_rest:
         raise ConfigError(
-            "boundary.rest: the path is entered and left at speed; choose a law that rests there (timing=raised_cosine "
-            "or quintic)"
+            "boundary.rest: the path is entered and left at speed; choose a law that rests there "
+            "(timing=raised_cosine, quintic or cruise)"
         )
     if problem.zero_acceleration and not any(problem.rest):
         raise ConfigError("boundary.zero_acceleration: of which ends is said by boundary.rest=[start,end]")
