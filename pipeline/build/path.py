@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,7 @@ from pipeline.path.curves import Geometry, Line, Still, circle, direction_vector
 from pipeline.path.orientation import Orientation
 from pipeline.path.reference import Reference
 from pipeline.path.through import SAME, TURN, Through, steps, through
-from pipeline.path.timing import ConstantSpeed, Quintic, RaisedCosine, Stamped, Timing, WithStops
+from pipeline.path.timing import ConstantSpeed, Cruise, Quintic, RaisedCosine, Stamped, Timing, WithStops
 from pipeline.path.waypoints import Waypoints, read, same_point
 
 NEGLIGIBLE = 1e-9  # of the length: a departure from the polygon below it is rounding
@@ -30,6 +31,11 @@ TIMINGS: dict[str, Callable[[float], Timing]] = {
     "constant_speed": ConstantSpeed,
     "quintic": Quintic,
 }
+
+
+def timing_law(timing: TimingConfig) -> Callable[[float], Timing]:
+    """What makes the law of a motion time [s]."""
+    return partial(Cruise, ramp=timing.ramp) if timing.law == "cruise" else TIMINGS[timing.law]
 
 
 def make_knots(timing: TimingConfig, duration: float) -> Array:
@@ -79,7 +85,7 @@ def make_reference(path: Any, timing: TimingConfig, task: Task, q_init: Array) -
                 f"timing.law = from_file: the times are those of a file; path.kind = {path.kind} has none"
             )
         geometry, orientation, notes = _curve(path, task, here[:count]), None, ()
-        law = TIMINGS[timing.law](timing.duration)
+        law = timing_law(timing)(timing.duration)
     if orientation is None and not isinstance(task, PositionTask):
         orientation = _turning(path, geometry, here[count:])
     start = np.hstack([one.sample(np.zeros(1))[0] for one in (geometry, orientation) if one is not None])
@@ -150,14 +156,14 @@ def _law(path: WaypointsConfig, timing: TimingConfig, found: Through, times: Arr
     length = found.geometry.length
     if times is not None:
         return Stamped(tuple((times - times[0]).tolist()), tuple((found.marks / length).tolist()), found.stops)
-    law = TIMINGS[timing.law]
+    law = timing_law(timing)
     if not found.stops:
         return law(timing.duration)
     if not law(timing.duration).at_rest:
         raise PathError(
             f"path.file = {path.file}: the path turns back, or on the spot, at way-point {found.stops[0] + 1} while "
-            f"moving at {length / timing.duration:.3g} m/s (timing.law = {timing.law}); the laws raised_cosine and "
-            "quintic come to rest there"
+            f"moving at {length / timing.duration:.3g} m/s (timing.law = {timing.law}); the laws raised_cosine, "
+            "quintic and cruise come to rest there"
         )
     between = [found.marks[i] / length for i in found.stops]
     return WithStops(law, timing.duration, (0.0, *map(float, between), 1.0))

@@ -90,10 +90,13 @@ class TimingConfig:
     """Group `timing`: the law s(t), the motion time and the number of intervals of the global grid."""
 
     law: Annotated[
-        Literal["raised_cosine", "constant_speed", "quintic", "from_file"],
+        Literal["raised_cosine", "constant_speed", "quintic", "cruise", "from_file"],
         Field(description="how the path is run through in time; from_file: by the column time of path.file"),
     ] = "raised_cosine"
     duration: Annotated[Number, Field(gt=0, description="[s] motion time, unless it is from_file")] = 10.0
+    ramp: Annotated[
+        Number, Field(ge=1e-3, le=0.5, description="of law cruise: the share of the motion time for each of its ends")
+    ] = 0.4
     steps: Annotated[Whole, Field(ge=2, le=100_000, description="intervals of the grid of the planner's optima")] = 100
     dense: Annotated[
         tuple[Annotated[Numbers, AfterValidator(_finer)], ...],

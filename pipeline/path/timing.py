@@ -1,4 +1,4 @@
-"""Timing laws s(t): raised cosine, constant speed, quintic; such a law with stops on the way; and time stamps."""
+"""Timing laws s(t): raised cosine, constant speed, quintic, cruise; such laws with stops on the way; time stamps."""
 
 from __future__ import annotations
 
@@ -74,6 +74,31 @@ class Quintic:
         s = length * u**3 * (10 - 15 * u + 6 * u**2)
         sd = length / total * 30 * u**2 * (1 - u) ** 2
         return s, sd, length / total**2 * 60 * u * (1 - u) * (1 - 2 * u)
+
+
+@dataclass(frozen=True)
+class Cruise:
+    """Up to speed in a share `ramp` of the motion time, as much of it down again, and constant speed in between.
+
+    T_a = ramp T, v = L / (T - T_a), acceleration (v / T_a)(1 - cos(2 pi t / T_a)), mirrored: with ramp = 1/2 the law of
+    the papers.
+    """
+
+    duration: float
+    ramp: float = 0.4
+    at_rest: bool = True
+
+    def sample(self, t: Array, length: float) -> tuple[Array, Array, Array]:
+        total, rise = self.duration, self.ramp * self.duration
+        speed, omega = length / (total - rise), 2 * np.pi / rise
+        late = t > total / 2
+        u = np.where(late, total - t, t)
+        up = u < rise
+        w = np.where(up, u, rise)
+        s = speed / rise * (w**2 / 2 + (np.cos(omega * w) - 1) / omega**2) + speed * (u - w)
+        sd = speed / rise * (w - np.sin(omega * w) / omega)
+        sdd = np.where(up, speed / rise * (1 - np.cos(omega * w)), 0.0)
+        return np.where(late, length - s, s), sd, np.where(late, -sdd, sdd)
 
 
 @dataclass(frozen=True)

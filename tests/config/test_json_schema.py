@@ -68,7 +68,7 @@ def test_bounds_and_words_are_there() -> None:
     nodes = dict(LEAVES)
     assert nodes["timing.duration"]["exclusiveMinimum"] == 0
     assert (nodes["timing.steps"]["minimum"], nodes["timing.steps"]["maximum"]) == (2, 100_000)
-    assert nodes["timing.law"]["enum"] == ["raised_cosine", "constant_speed", "quintic", "from_file"]
+    assert nodes["timing.law"]["enum"] == ["raised_cosine", "constant_speed", "quintic", "cruise", "from_file"]
     assert nodes["parallel.workers"]["nullable"]
 
 

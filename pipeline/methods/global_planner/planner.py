@@ -21,7 +21,7 @@ from pipeline.methods.global_planner.basins import Basins, basins
 from pipeline.methods.global_planner.batch import JUMPS, Batch
 from pipeline.methods.global_planner.grids import coarsest, finer, on_knots, refinement
 from pipeline.methods.global_planner.optimum import Optimum, go_on, optimise_start, refine
-from pipeline.methods.global_planner.reasons import no_feasible, no_optimum, no_start
+from pipeline.methods.global_planner.reasons import counted, no_feasible, no_optimum, no_start
 from pipeline.methods.global_planner.smooth import freer, rough, smooth, splined, unserved
 from pipeline.methods.global_planner.starts import Starts
 from pipeline.methods.method import ANY, Context, Method
@@ -117,8 +117,7 @@ def by_differences(problem: Problem, options: GlobalOptions, context: Context) -
         return [_nothing(problem, Status.NOT_CONVERGED, why_not, log)]
     members = {id(fine): count for fine, count in found}
     ranked = basins(problem, problem.times, [fine for fine, _ in found], options.same_path).optima
-    count = f"{len(ranked)} distinct optim{'um' if len(ranked) == 1 else 'a'} found from {len(starts)} starts"
-    words = f"{count}; the last {coarse.barren} starts brought nothing new; "
+    words = counted(len(ranked), len(starts), coarse.barren)
     solutions = []
     for rank, fine in enumerate(ranked):
         own = {"starts_in_basin": members[id(fine)], "solves": fine.solves}

@@ -13,6 +13,8 @@ from scipy.interpolate import CubicSpline
 
 from pipeline.common.arrays import Array
 from pipeline.config.methods import GlobalOptions
+from pipeline.methods.global_planner.optimum import confirmed
+from pipeline.methods.global_planner.reasons import counted
 from pipeline.methods.method import Context
 from pipeline.problem.limits import FREE, LIMIT_KINDS
 from pipeline.problem.problem import Boundary, Problem
@@ -33,6 +35,12 @@ TRACKING = 1e-8  # [m] at every knot; where two are left out, the path's own tol
 
 
 ENOUGH = 1e-6  # relative: how well limits must be kept
+
+
+SHOWN = 1.5  # steps in a start from rest that show it
+
+
+LEAST = 1e-4  # of the motion time: a start from rest that takes less is not shown
 
 
 @dataclass(frozen=True)
@@ -109,25 +117,24 @@ def freer(problem: Problem) -> Problem:
     return replace(loose, limits=replace(loose.bounds, velocity=free))
 
 
-def unresolved(problem: Problem, motion: Array) -> str:
-    """That the grid is too coarse for the start from rest, and which would do; nothing where it is not.
+def resolved(problem: Problem, motion: Array) -> Array:
+    """The problem's knots, and as many more at a start from rest as show it.
 
-    Within the limits of acceleration the joints take some time to the speed at which the optimum by differences,
-    `motion`, jumps off: two steps are needed to see it.
+    Within their limits the joints take some time to the speed at which the optimum by differences, `motion`, jumps off.
+    Where a step and a half do not fall into it, two do, two fall behind it, and from there on each is
+    twice the one before.
     """
     bounds, times = problem.bounds, problem.times
     if not (problem.rest[0] and problem.boundary is Boundary.FIXED) or problem.objective.second_order:
-        return ""
+        return times
     jump = np.abs(motion[1] - motion[0]) / (times[1] - times[0])
-    takes, steps = float((jump / bounds.acceleration).max()), len(times) - 1
-    needed = 2 * problem.reference.duration / takes if takes > 0 else 0.0
-    if needed <= steps or takes == 0:
-        return ""
-    enough = float(f"{1.05 * needed:.1e}")
-    return (
-        f"the start from rest takes {takes:.2g} s within limits.acceleration, less than two of {steps} steps, and its "
-        f"energy depends on the grid a little: timing.steps = {enough:.0f} or a smaller limit shows it"
-    )
+    takes = float(np.maximum(jump / bounds.acceleration, 2 * np.sqrt(jump / bounds.jerk)).max())
+    first = float(times[1] - times[0])
+    if takes >= SHOWN * first or takes <= LEAST * problem.reference.duration:
+        return times
+    steps = takes / 2 * np.array([1.0, 1.0, 1.0, *2.0 ** np.arange(40)])
+    early = times[0] + np.cumsum(steps[steps < first])
+    return np.concatenate([times[:1], early, times[times > early[-1] + first / 2]])
 
 
 def smooth(problem: Problem, found: list[Solution], options: GlobalOptions, context: Context) -> list[Solution]:
@@ -135,6 +142,8 @@ def smooth(problem: Problem, found: list[Solution], options: GlobalOptions, cont
     motions = [solution.trajectory.q for solution in found if solution.found]
     if not motions:
         return found
+    knots, given = resolved(problem, motions[0]), problem.times
+    problem, motions = replace(problem, times=knots), list(CubicSpline(given, motions, axis=1)(knots))
     splines = context.workers.map(refine, (problem, options), motions)
     log = found[0].statistics
     if not any(spline.converged for spline in splines):
@@ -149,18 +158,22 @@ def smooth(problem: Problem, found: list[Solution], options: GlobalOptions, cont
     costs = np.array([spline.cost for spline in good])
     every = np.array([spline.curve.q for spline in good])
     revolute = problem.task.arm.description.revolute
+    ranked = distinct(every, costs, len(good), options.same_path, revolute)
+    words = counted(len(ranked), len(log.get("starts", splines)), log.get("barren_starts", 0))
+    more = f"{len(knots) - len(given)} more knots show the start from rest" * (len(knots) > len(given))
     solutions = []
-    for rank, index in enumerate(distinct(every, costs, len(good), options.same_path, revolute)):
+    for rank, index in enumerate(ranked):
         own = good[index]
         solutions.append(
             Solution(
                 "global",
                 Trajectory(problem.times, own.curve.q, own.curve.ends),
                 Status.SOLVED,
-                "; ".join(filter(None, [found[0].message, unresolved(problem, motions[0])])) if rank == 0 else "",
+                "; ".join(filter(None, [found[0].message, more])) if rank == 0 else "",
                 optimum=rank + 1,
                 tracking_tolerance=problem.reference.tolerance if problem.zero_acceleration else TRACKING,
                 limits_kept=LIMIT_KINDS,
+                evidence=(words if rank == 0 else "") + confirmed(own.solves),
                 statistics={**(log if rank == 0 else {}), "spline_solves": own.solves, "cost": own.cost},
             )
         )
@@ -170,8 +183,11 @@ def smooth(problem: Problem, found: list[Solution], options: GlobalOptions, cont
 def refine(context: tuple[Problem, GlobalOptions], motion: Array) -> Smooth:
     """The spline that is nearest to an optimum by differences: coarse to fine where torques count."""
     problem, options = context
-    solver, grids = _Solver(options), _grids(problem)
-    guess = Curve.through(problem, grids[0], CubicSpline(problem.times, motion)(grids[0]))
+    guess = Curve.through(problem, problem.times, motion)
+    served = not problem.objective.second_order and keeps_forces(problem, guess)
+    solver, grids = _Solver(options), [problem.times] if served else _grids(problem)
+    if not served:
+        guess = Curve.through(problem, grids[0], CubicSpline(problem.times, motion)(grids[0]))
     solved = solver.lazily(problem, guess)
     if len(grids) > 1 and not solved.outcome.converged:
         guess = Curve.through(problem, grids[-1], motion)
@@ -185,6 +201,8 @@ def refine(context: tuple[Problem, GlobalOptions], motion: Array) -> Smooth:
         solved, further = tighten(problem, solved, **solver.given)
         for one in further:
             solver.note(one)
+    if solved.outcome.converged:
+        solver.solves[-1]["violation"], solver.solves[-1]["optimality"] = solved.residuals()
     kept = all(float(excess.max()) <= ENOUGH for excess in excesses(problem, solved.curve).values())
     status = solved.outcome.status if kept or not solved.outcome.converged else "exceeds a limit between its knots"
     good = kept and solved.outcome.converged

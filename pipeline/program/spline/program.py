@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,8 +12,9 @@ from pipeline.problem.lagrangian import trapezoid_weights
 from pipeline.problem.problem import Boundary, Problem
 from pipeline.program import ipopt
 from pipeline.program.program import Lifted
+from pipeline.program.residuals import residuals
 from pipeline.program.scaling import POSITION_SCALE, Sums, scale
-from pipeline.program.spline.curve import Curve, free_ends, integrals, stations
+from pipeline.program.spline.curve import Curve, by_simpson, integrals, stations
 
 SMALL = 3e-4  # of velocities and accelerations among the unknowns, relative to the guess's, with the kinetic energy
 
@@ -39,12 +40,19 @@ class Tightened:
 
 @dataclass(frozen=True)
 class Solved:
-    """A spline as IPOPT leaves it; iterations; stretch: what its times are to be multiplied with."""
+    """A spline as IPOPT leaves it; iterations; program: the solved one; stretch: what its times are to be multiplied
+    with.
+    """
 
     curve: Curve
     outcome: ipopt.Outcome
     iterations: int
-    stretch: float = field(default=1.0)
+    program: Spline
+    stretch: float = 1.0
+
+    def residuals(self) -> tuple[float, float]:
+        """Violation and optimality that IPOPT has left, see `residuals.py`."""
+        return residuals(self.program.drake, self.outcome.result)
 
 
 class Spline(Lifted):
@@ -65,12 +73,12 @@ class Spline(Lifted):
         if self.counts:
             self.w = self.new("w", self.scaling.to_w(velocity))
             self.middle = self.new("middle", POSITION_SCALE * middle)
-            self.stations = np.vstack([self.y, self.middle]) if free_ends(problem) else self.middle
+            self.stations = np.vstack([self.y, self.middle]) if by_simpson(problem, guess.times) else self.middle
         if self.forces:
             self.new("forces", self.scaling.force * costs.tau[:, self.forces.rows])
         # r, r^2, r^3
         self.stretch = None if stretch is None else self.new("stretch", stretch ** np.array([1.0, 2.0, 3.0]))
-        if problem.zero_acceleration and not self.closed:
+        if problem.zero_acceleration:
             # Ends at rest without acceleration give the path's rows there all that they can be given.
             self.left_out = tuple(
                 knot for knot, rests in zip((1, self.intervals - 1), problem.rest, strict=True) if rests
@@ -82,7 +90,7 @@ class Spline(Lifted):
         q, v, a = (self.read(outcome, unknowns) for unknowns in (self.y, self.v, self.a))
         curve = Curve(self.times, q / POSITION_SCALE, v / self.v_unit, a / self.a_unit)
         stretch = 1.0 if self.stretch is None else float(self.read(outcome, self.stretch)[0])
-        return Solved(curve, outcome, iterations, stretch)
+        return Solved(curve, outcome, iterations, self, stretch)
 
 
 def _size(values: Array) -> float:

@@ -57,14 +57,18 @@ def _velocities(program: Spline, which: slice, parts: list[tuple[Any, Any]]) -> 
 
 
 def rest(program: Spline) -> None:
-    """No velocity, and where it is asked for no acceleration, at ends that rest; a cycle ends as it began."""
+    """No velocity, and where it is asked for no acceleration, at ends that rest; a cycle without rest ends as it began.
+
+    Of one with rest nothing more is asked: between two of its rounds the arm stands still, and its path, at rest at
+    every knot but these, gives its ends all accelerations that it can give.
+    """
     still = np.zeros(program.n)
     for knot, rests in zip((0, -1), program.problem.rest, strict=True):
         if rests:
             program.drake.AddBoundingBoxConstraint(still, still, program.v[knot])
             if program.problem.zero_acceleration:
                 program.drake.AddBoundingBoxConstraint(still, still, program.a[knot])
-    if not program.closed:
+    if not program.closed or all(program.problem.rest):
         return
     both = np.hstack([np.eye(program.n), -np.eye(program.n)])
     for own, given in ((program.v, any(program.problem.rest)), (program.a, program.problem.zero_acceleration)):
