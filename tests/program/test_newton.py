@@ -23,7 +23,7 @@ from pipeline.program.newton.momentum import Momentum
 from pipeline.program.newton.newton import Newton
 from pipeline.program.newton.serve import Solver, why_not
 from pipeline.search.roadmap import Roadmap
-from tests.support import composed, differences
+from tests.support import composed, dense, differences
 
 BOUNDARIES = list(Boundary)
 

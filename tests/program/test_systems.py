@@ -5,25 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.common.arrays import Array
 from pipeline.problem.problem import Boundary
 from pipeline.program.newton import triangular
 from pipeline.program.newton.banded import Banded
 from pipeline.program.newton.knots import Knots
-
-
-def dense(blocks: tuple[Array, ...], cyclic: bool) -> Array:
-    """(U s, U s) of blocks (U, s, s) on the diagonal and above it."""
-    count, size = blocks[0].shape[:2]
-    out = np.zeros((count, size, count, size))
-    for apart, band in enumerate(blocks):
-        assert len(band) == (count if cyclic else count - apart)
-        for k, block in enumerate(band):
-            other = (k + apart) % count
-            out[k, :, other] += block
-            if apart:
-                out[other, :, k] += block.T
-    return out.reshape(count * size, count * size)
+from tests.support import dense
 
 
 @pytest.mark.parametrize("cyclic", [False, True])
