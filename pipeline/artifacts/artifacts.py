@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from pipeline.artifacts import motion_files, record, summary
-from pipeline.artifacts.figures import figures
-from pipeline.artifacts.recording import recording
+from importlib import import_module
+
 from pipeline.artifacts.report import Artifact
 
-# The recording opens with a figure, and run.json comes last: it says that a run is finished.
-ARTIFACTS: tuple[Artifact, ...] = (
-    summary.write,
-    figures.write,
-    motion_files.write,
-    recording.write,
-    record.write,
-)
+# Modules of this package. The recording opens with a figure, and run.json comes last: it says that a run is finished.
+ARTIFACTS = ("summary", "figures.figures", "motion_files", "recording.recording", "record")
 
 
-def name(artifact: Artifact) -> str:
-    """What it is called: its module below this package, such as `figures`."""
-    return artifact.__module__.removeprefix(f"{__package__}.").partition(".")[0]
+def writer(artifact: str) -> Artifact:
+    """What writes it, loaded only now: figures and recordings bring the heaviest libraries of all."""
+    write: Artifact = import_module(f"{__package__}.{artifact}").write
+    return write
+
+
+def name(artifact: str) -> str:
+    """What it is called, such as `figures`."""
+    return artifact.partition(".")[0]

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import colorsys
+from typing import TYPE_CHECKING
 
 from pipeline.methods.registry import METHODS
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 # Joints 1, 2, 3 are blue, red and yellow in the papers; the others keep apart from them and from one another.
 JOINT_COLORS = ("#1F5FBF", "#C62828", "#D9A400", "#2E8B57", "#7B3FA0", "#00838F", "#8D5524", "#D81B7A", "#5A6472")
@@ -14,6 +18,16 @@ UNKNOWN = "#44403C"
 
 
 FRONT = 19  # points after the first over which a front's hues run from blue to red
+
+
+def blank(width: float, height: float) -> Figure:
+    """An empty figure [in]; only the first one loads matplotlib, after the verdict is on the console."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
 
 
 def _split(label: str) -> tuple[str, int]:
