@@ -141,7 +141,7 @@ SIM1 = {
     "boundary": {"kind": "free"},
     "path": {"kind": "line", "length": 0.4},
     "timing": {"duration": 1.0, "steps": 26},
-    "method": {"global": {"configurations": 6, "candidates": 60, "optimised": 6, **ALONE}},
+    "method": {"global": {"configurations": 4, "candidates": 40, "optimised": 6, **ALONE}},
 }
 
 
@@ -181,7 +181,7 @@ def test_a_killed_run_goes_on(
 ) -> None:
     words = [
         *("+experiment=sim1", "timing.steps=26", "parallel.workers=1"),
-        *(f"method.global.{key}" for key in ("configurations=8", "candidates=100", "optimised=10")),
+        *(f"method.global.{key}" for key in ("configurations=4", "candidates=40", "optimised=6")),
     ]
 
     killed = tmp_path / "killed"
@@ -195,8 +195,7 @@ def test_a_killed_run_goes_on(
     assert not (killed / UNFINISHED).exists()
     assert {file.name for file in killed.iterdir()} == RUN_FILES
     # The same as without the interruption.
-    options = {"configurations": 8, "candidates": 100, "optimised": 10, **ALONE}
-    undisturbed = config.check({**SIM1, "method": {"global": options}})
+    undisturbed = config.check(SIM1)
     whole = global_planner(prepare(undisturbed), undisturbed.method.global_)
     motions = pd.read_parquet(killed / "trajectories.parquet").groupby("optimum")
     assert len(motions) == len(whole)

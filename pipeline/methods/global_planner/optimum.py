@@ -184,7 +184,7 @@ def optimise(problem: Problem, times: Array, guess: Array, options: GlobalOption
         "cost": cost,
     }
     if last:
-        entry["violation"], entry["optimality"] = residuals(program.drake, outcome.result)
+        entry["violation"], entry["optimality"] = residuals(program.drake, outcome.result, program.functions)
     return Optimum(q, cost, outcome.converged, outcome.status, solves=[entry])
 
 

@@ -203,7 +203,8 @@ def _draw_on(
     while True:
         motions = drawn.further(max(0, min(len(starts), options.budget - len(starts))), grid)
         if len(motions):
-            fresh, done = batch.coarse(grid, motions), _teller(context, len(motions), starts)
+            dear = DEAREST * min(start.cost for start in starts if start.converged)
+            fresh, done = batch.coarse(grid, motions, dear), _teller(context, len(motions), starts)
             for count, start in enumerate(fresh, 1):
                 done(count, start)
             starts = starts + fresh

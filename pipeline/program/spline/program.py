@@ -126,7 +126,7 @@ class Spline(Lifted):
             units |= dict(zip(map(id, (self.law.s, self.law.sd, self.law.sdd)), self.law.units, strict=True))
         return units.get(id(own), POSITION_SCALE)
 
-    def solve(self, **options: object) -> Solved:
+    def solve(self, **options: Any) -> Solved:
         """Solve from the guess."""
         outcome, iterations = self.run(**options)
         q, v, a = (self.read(outcome, unknowns) for unknowns in (self.y, self.v, self.a))
