@@ -9,6 +9,9 @@ from pipeline.common.errors import ConfigError
 from pipeline.model.kinematics import project
 from pipeline.problem.problem import Boundary, Problem
 
+PACE = ("velocity", "acceleration", "jerk", "torque", "power")
+
+
 SHARE = 0.05  # of the motion time, in which the suggested acceleration reaches the motion's largest joint speed
 
 
@@ -28,6 +31,13 @@ def check_rest(problem: Problem) -> None:
             "limits.jerk: a motion that begins or ends with an acceleration has a jerk without bound there; set "
             "boundary.rest=[start,end] and boundary.zero_acceleration=true"
         )
+    if problem.free_duration:
+        if not any(np.isfinite(getattr(bounds, kind)).any() for kind in PACE):
+            raise ConfigError(
+                "timing.duration = shortest: nothing limits the motion's pace; set limits.velocity, "
+                "limits.acceleration or limits.torque"
+            )
+        return
     if problem.rest[0] and unlimited_start(problem):
         raise ConfigError(
             "boundary.rest: with a given start and an objective of velocities there is no best motion from rest "

@@ -35,6 +35,7 @@ def run(config: RunConfig, folder: Path) -> int:
     with stages("solve"), console.progress(config.name) as progress:
         solutions, seconds = solve(problem, config, Context(config.seed, workers, progress))
     with stages("evaluate"):
+        problem = solutions[0].posed(problem)  # where its timing was to be found, with that of the best
         motions = Motions(config, problem, [evaluate(problem, solution) for solution in solutions], workers)
     with stages("studies"):
         results = tuple(result for study in STUDIES if (result := study(motions)) is not None)

@@ -45,6 +45,7 @@ KINDS: dict[str, dict[str, Any]] = {
         "rest": BOTH,
         "zero_acceleration": True,
     },
+    "kinetic energy, free law": {"rest": BOTH, "free_law": True},
     "velocity norm, cyclic": {"objective": Objective({"velocity_norm": 1.0}), "boundary": Boundary.CYCLIC},
 }
 
@@ -105,7 +106,7 @@ def test_every_unknown_starts_at_the_guess(make: Callable[..., Spline], kind: st
     made = make(kind)
     x, program = made.drake.initial_guess(), made.drake
     for binding in program.linear_equality_constraints():
-        if "cyclic" not in kind:
+        if "cyclic" not in kind and "law" not in kind:
             np.testing.assert_allclose(program.EvalBinding(binding, x), 0.0, atol=1e-9)
     np.testing.assert_allclose(x[: made.y.size].reshape(13, 3) / POSITION_SCALE, made.guess.q, rtol=1e-12)
     assert program_value(made, x)[0] == pytest.approx(1.0, rel=1e-9)

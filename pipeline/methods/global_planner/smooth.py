@@ -55,7 +55,7 @@ class Smooth:
 
 
 @dataclass
-class _Solver:
+class Searches:
     """Solves with their statistics."""
 
     options: GlobalOptions
@@ -73,6 +73,10 @@ class _Solver:
         self.last = solved.curve if solved.outcome.converged else self.last
         return solved
 
+    def confirm(self, solved: Solved) -> None:
+        """Note what IPOPT has left of the last solve."""
+        self.solves[-1]["violation"], self.solves[-1]["optimality"] = solved.residuals()
+
     def lazily(self, problem: Problem, guess: Curve) -> Solved:
         """Torque and power limits come in only where the optimum without them breaks them."""
         loose = without_forces(problem)
@@ -87,7 +91,7 @@ class _Solver:
 
 def splined(problem: Problem, options: GlobalOptions) -> bool:
     """Whether the motion is to be a spline: asked for by name, or by rest and limits that differences do not know."""
-    asks = any(problem.rest) or problem.bounds.smooth
+    asks = any(problem.rest) or problem.bounds.smooth or problem.free_timing
     return options.transcription == "spline" or (options.transcription is None and asks)
 
 
@@ -107,7 +111,8 @@ def unserved(problem: Problem, options: GlobalOptions) -> str | None:
 def rough(problem: Problem) -> Problem:
     """The problem without what differences do not know."""
     limits = replace(problem.bounds, acceleration=FREE, jerk=FREE)
-    return replace(problem, rest=(False, False), zero_acceleration=False, limits=limits)
+    given = replace(problem, rest=(False, False), zero_acceleration=False, limits=limits)
+    return replace(given, free_law=False, free_duration=False)
 
 
 def freer(problem: Problem) -> Problem:
@@ -185,16 +190,16 @@ def refine(context: tuple[Problem, GlobalOptions], motion: Array) -> Smooth:
     problem, options = context
     guess = Curve.through(problem, problem.times, motion)
     served = not problem.objective.second_order and keeps_forces(problem, guess)
-    solver, grids = _Solver(options), [problem.times] if served else _grids(problem)
+    solver, finer = Searches(options), [problem.times] if served else grids(problem)
     if not served:
-        guess = Curve.through(problem, grids[0], CubicSpline(problem.times, motion)(grids[0]))
+        guess = Curve.through(problem, finer[0], CubicSpline(problem.times, motion)(finer[0]))
     solved = solver.lazily(problem, guess)
-    if len(grids) > 1 and not solved.outcome.converged:
-        guess = Curve.through(problem, grids[-1], motion)
+    if len(finer) > 1 and not solved.outcome.converged:
+        guess = Curve.through(problem, finer[-1], motion)
         solved = solver.lazily(problem, guess)
-    elif len(grids) > 1:
+    elif len(finer) > 1:
         loose = keeps_forces(problem, solved.curve)
-        for grid in grids[1:]:
+        for grid in finer[1:]:
             guess = Curve.through(problem, grid, solved.curve(grid), solved.curve.ends)
             solved = solver.lazily(problem, guess) if loose else solver.whole(problem, guess)
     if solved.outcome.converged:
@@ -202,7 +207,7 @@ def refine(context: tuple[Problem, GlobalOptions], motion: Array) -> Smooth:
         for one in further:
             solver.note(one)
     if solved.outcome.converged:
-        solver.solves[-1]["violation"], solver.solves[-1]["optimality"] = solved.residuals()
+        solver.confirm(solved)
     kept = all(float(excess.max()) <= ENOUGH for excess in excesses(problem, solved.curve).values())
     status = solved.outcome.status if kept or not solved.outcome.converged else "exceeds a limit between its knots"
     good = kept and solved.outcome.converged
@@ -213,8 +218,8 @@ def refine(context: tuple[Problem, GlobalOptions], motion: Array) -> Smooth:
 def shortest(context: tuple[Problem, GlobalOptions], start: Curve) -> Smooth:
     """The motion of least time from `start`, the law of the path kept; `cost`: that time over the one asked for."""
     problem, options = context
-    solver, curve = _Solver(options), start
-    for grid in _grids(problem):
+    solver, curve = Searches(options), start
+    for grid in grids(problem):
         guess = Curve.through(problem, grid, curve(grid), curve.ends)
         program = transcribe(problem, guess, stretch=room(problem, guess))
         solved = solver.note(program.solve(**solver.given))
@@ -233,7 +238,7 @@ def room(problem: Problem, curve: Curve) -> float:
     )
 
 
-def _grids(problem: Problem) -> list[Array]:
+def grids(problem: Problem) -> list[Array]:
     """One grid, but two or three where torques count."""
     intervals = len(problem.times) - 1
     bounds = problem.bounds
@@ -248,16 +253,21 @@ def _grids(problem: Problem) -> list[Array]:
 def _nothing(problem: Problem, fastest: Smooth | None, splines: list[Smooth], log: dict[str, Any]) -> Solution:
     """No spline keeps every limit: which one cannot be met, and in what time all could."""
     tried = f"none of {len(splines)} optima" if len(splines) > 1 else "the one optimum found"
-    standing = Trajectory(problem.times, np.tile(problem.q_init, (len(problem.times), 1)))
     statistics = {**log, "spline_solves": [spline.solves for spline in splines]}
     if fastest is None or not np.isfinite(fastest.cost):
         words = "; ".join(sorted({spline.status for spline in splines}))
         message = f"{tried} leads to a smooth motion within all limits ({words}); try more knots (timing.steps)"
-        return Solution("global", standing, Status.NOT_CONVERGED, message, statistics=statistics, found=False)
+        return nothing(problem, Status.NOT_CONVERGED, message, statistics)
     violation, duration = worst(problem, fastest.curve), problem.reference.duration * fastest.cost
     assert violation is not None
     message = (
         f"{violation.bound} cannot be met between the knots: the least excess found is {violation.extent}; "
         f"shortest feasible duration {duration:.4g} s"
     )
-    return Solution("global", standing, Status.INFEASIBLE, message, statistics=statistics, found=False)
+    return nothing(problem, Status.INFEASIBLE, message, statistics)
+
+
+def nothing(problem: Problem, status: Status, message: str, log: dict[str, Any]) -> Solution:
+    """The answer that there is no motion, and why."""
+    standing = Trajectory(problem.times, np.tile(problem.q_init, (len(problem.times), 1)))
+    return Solution("global", standing, status, message, statistics=log, found=False)
