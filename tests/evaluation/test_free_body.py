@@ -10,6 +10,7 @@ import pytest
 
 from pipeline.build.problem import prepare
 from pipeline.common.arrays import Array
+from pipeline.config.methods import LsvOptions
 from pipeline.evaluation.evaluation import Evaluation, evaluate
 from pipeline.evaluation.free_body import BasePlant, integrate
 from pipeline.methods.global_planner.planner import global_planner
@@ -89,8 +90,10 @@ def test_momentum_and_path_of_the_other_methods(method: str) -> None:
 @pytest.mark.slow
 def test_the_path_error_is_of_second_order_in_the_step() -> None:
     errors = []
-    for steps in (25, 50, 100):
-        problem, solution = stated(*ON_BASE, f"timing.steps={steps}", "method.global.optimised=1")
+    for steps in (20, 40, 80):
+        problem, solution = stated(
+            *ON_BASE, f"timing.steps={steps}", "method.global.optimised=1", "method.global.candidates=20"
+        )
         joints = solution.trajectory.q[:, problem.task.arm.joints]
         found = integrate(problem, solution.trajectory.time, joints)
         errors.append(found.path_error)
@@ -218,14 +221,15 @@ def test_heavy_bases_are_fixed_ones_in_the_limit() -> None:
         "method.global.optimised=1",
         "method.pmke.prediction_step=0.8",
         "method.pmke.update_interval=0.8",
+        "method.pmke.dt=0.05",
     )
 
     def energies(*base: str) -> tuple[Array, float]:
         config = composed(*words, *base)
         problem = prepare(config)
         found = [
-            lsv(problem)[0],
-            inertia_weighted(problem)[0],
+            lsv(problem, LsvOptions(dt=0.05))[0],
+            inertia_weighted(problem, LsvOptions(dt=0.05))[0],
             pmke(problem, config.method.pmke)[0],
             global_planner(problem, config.method.global_, Context(config.seed))[0],
         ]
