@@ -16,7 +16,7 @@ from tests.support import composed
 
 QUICK = (
     *("method.global.optimised=1", "method.global.nodes=40", "method.pareto.steps=2", "method.pareto.rounds=1"),
-    *("method.lsv.dt=0.02", "method.inertia_weighted.dt=0.02", "method.pmke.dt=0.02"),
+    *("method.lsv.dt=0.02", "method.inertia_weighted.dt=0.02"),
     *("method.pontryagin.guesses=2", "method.pontryagin.tolerance=1e-7"),
     *("method.calculus_of_variations.spacing=0.2", "method.calculus_of_variations.tolerance=1e-8"),
 )
