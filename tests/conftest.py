@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import pickle
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+from hydra._internal.config_repository import ConfigRepository
+from hydra.plugins.config_source import ConfigResult
 from hypothesis import settings
 
 from pipeline.common.arrays import Array
@@ -21,12 +24,36 @@ from pipeline.path.reference import Reference
 from pipeline.path.timing import RaisedCosine
 from pipeline.problem.problem import Problem
 from pipeline.robot import urdf
+from pipeline.run.main import CONF
 from tests.once import made_once
 from tests.support import ROOT
 
 settings.register_profile("project", derandomize=True, deadline=None, max_examples=50)
 settings.register_profile("many", deadline=None, max_examples=1000, print_blob=True, database=None)
 settings.load_profile("project")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _files_of_conf_are_read_once() -> Iterator[None]:
+    """Hydra parses every file again whenever it composes, which takes a third of its time. Nobody changes these files
+    while tests run.
+    """
+    load = ConfigRepository.load_config
+    read: dict[tuple[str, ...], bytes] = {}
+
+    def load_once(repository: ConfigRepository, config_path: str) -> ConfigResult | None:
+        places = [source.path for source in repository.get_sources()]
+        if not {*places} <= {"hydra.conf", "", str(ROOT / "conf"), CONF}:
+            return load(repository, config_path)
+        key = (config_path, *places)
+        if key not in read:
+            read[key] = pickle.dumps(load(repository, config_path))
+        made: ConfigResult | None = pickle.loads(read[key])
+        return made
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(ConfigRepository, "load_config", load_once)
+        yield
 
 
 @pytest.fixture(scope="session")
@@ -146,6 +173,7 @@ def reproduce_in(folder: Path) -> None:
 
     few = (
         *(f"method.global.{key}" for key in ("configurations=12", "candidates=150", "optimised=12", "solver=newton")),
+        *(f"method.calculus_of_variations.{key}" for key in ("spacing=0.08", "tolerance=1e-8")),
         "identification.documents=[global]",
     )
     # Its law is one of large numbers.

@@ -26,10 +26,10 @@ from pipeline.run.ownership import LOCK
 from tests.support import ROOT
 from tests.tasks import HUNG, wait_until
 
-SIZES = ("configurations=8", "candidates=60", "optimised=8", "solver=ipopt", "starts=population", "coarse_steps=12")
+SIZES = ("configurations=4", "candidates=24", "optimised=6", "solver=ipopt", "starts=population", "coarse_steps=12")
 FEW = tuple(f"method.global.{size}" for size in SIZES)
-PLAN = ("+experiment=sim1", "methods=[global]", "timing.steps=26", *FEW)
-FRONT = ("+experiment=pareto", "timing.steps=20", "method.pareto.steps=4", *FEW)
+PLAN = ("+experiment=sim1", "methods=[global]", "timing.steps=14", *FEW)
+FRONT = ("+experiment=pareto", "timing.steps=12", "method.pareto.steps=3", *FEW)
 SWEEP = ("-m", *PLAN, "seed=1,2")
 WHAT = {"plan": PLAN, "front": FRONT, "sweep": SWEEP}
 GONE = 2.0  # [s] by when every process has left

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from pipeline.artifacts import motion_files, record, summary
-from pipeline.artifacts.figures import figures
-from pipeline.artifacts.recording import recording
-from pipeline.artifacts.report import Artifact
+from importlib import import_module
+from pathlib import Path
 
-# The recording opens with a figure, and run.json comes last: it says that a run is finished.
-ARTIFACTS: tuple[Artifact, ...] = (
-    summary.write,
-    figures.write,
-    motion_files.write,
-    recording.write,
-    record.write,
-)
+from pipeline.artifacts.report import Report
+
+# Modules of this package. The recording opens with a figure, and run.json comes last: it says that a run is finished.
+ARTIFACTS = ("summary", "figures.figures", "motion_files", "recording.recording", "record")
 
 
-def name(artifact: Artifact) -> str:
-    """What it is called: its module below this package, such as `figures`."""
-    return artifact.__module__.removeprefix(f"{__package__}.").partition(".")[0]
+def name(artifact: str) -> str:
+    """What it is called, such as `figures`."""
+    return artifact.partition(".")[0]
+
+
+def write(artifact: str, report: Report, folder: Path) -> None:
+    """Write it into `folder`. Its module is imported here: nobody waits for a plot library before the verdict."""
+    import_module(f"{__package__}.{artifact}").write(report, folder)

@@ -11,6 +11,8 @@ MOST_STEPS = 100_000  # every one is evaluated, drawn and recorded
 MOST_SAMPLES = 1_000_000  # every one is simulated, no more
 MOST_EDGES = 10_000_000  # of a roadmap, or links of a bound's cells: each takes some dozens of bytes
 MOST_STEPS_OF_DP = 1_000_000_000  # from node to node: as many take half a minute
+MOST_INTERVALS = 20_000  # of a motion that is planned: as many take a minute and 0.2 GB
+USUAL, MOST_KNOTS = 25, 100_000  # intervals of a coarsest grid; of all starts on it together: each takes 10 kB and more
 MOST_PLACES = 1_000_000  # on the paths through every node: as many take ten seconds
 SHORTEST, LONGEST = 1e-6, 1e9  # [s] of a motion
 STEPS = ("dt", "prediction_step", "update_interval")
@@ -60,6 +62,10 @@ def _pairs(config: Any, method: str) -> Iterator[tuple[float, float, str, str, s
     options, steps = config.method.of(method), config.timing.steps
     planner = options.planner if method == "pareto" else options
     if method in ("global", "pareto"):
+        yield steps, MOST_INTERVALS, f"timing.steps = {steps}", "their number", "intervals of planned motions"
+        starts, coarse = planner.optimised, planner.coarse_steps or USUAL
+        keys = f"method.global.optimised = {starts}, method.global.coarse_steps = {planner.coarse_steps or 'null'}"
+        yield starts * min(coarse, steps), MOST_KNOTS, keys, "optimised x coarse_steps", "knots at once"
         nodes, layers = planner.nodes, planner.layers
         keys = f"method.global.nodes = {nodes}, method.global.layers = {layers}"
         yield nodes**2 * layers, MOST_EDGES, keys, "nodes x nodes x layers", "edges"

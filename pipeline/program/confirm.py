@@ -8,11 +8,15 @@ scale the objective, or those multipliers are not the optimal ones any more.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from pipeline.common.arrays import Array
 from pipeline.problem.problem import Problem
+from pipeline.program.ipopt import Outcome
+from pipeline.program.plain import Plain
+from pipeline.program.program import Lifted
 from pipeline.program.residuals import residuals
 from pipeline.program.transcription import transcribe
 
@@ -27,6 +31,7 @@ HANDOVER = {
     "constr_mult_init_max": 1e8,  # else the first multipliers of long rows are put to zero
     "acceptable_iter": 3,  # where rounding keeps IPOPT from its last digits, at an optimum it cannot gain any
 }
+AT_ONCE = 2  # iterations on the plain program
 
 
 @dataclass(frozen=True)
@@ -45,11 +50,29 @@ class Confirmation:
     optimality: float
 
 
-def confirm(
-    problem: Problem, times: Array, q: Array, *, tolerance: float, max_iterations: int, keep_off: float = 0.0
-) -> Confirmation:
-    """IPOPT's own answer from q (N + 1, n); keep_off [m]: as in `transcribe`."""
-    program = transcribe(problem, times, q, keep_off=keep_off)
-    final, outcome, iterations = program.solve(tolerance=tolerance, max_iterations=max_iterations, extra=HANDOVER)
-    moved, left = float(np.abs(final - q).max()), residuals(program.drake, outcome.result)
+class Confirm:
+    """IPOPT's answers from optima of one problem on one grid: where positions tell all, on the plain program, once
+    made; where IPOPT does not stop there at once, as elsewhere on a lifted one.
+    """
+
+    def __init__(self, problem: Problem, times: Array, tolerance: float, max_iterations: int) -> None:
+        self.problem, self.times, self.max_iterations = problem, times, max_iterations
+        self.options: dict[str, Any] = {"tolerance": tolerance, "extra": HANDOVER}
+        self._plain: Plain | None = None
+
+    def __call__(self, q: Array, cost: float, keep_off: float = 0.0) -> Confirmation:
+        """From q (N + 1, n), of that cost; keep_off [m]: as in `transcribe`."""
+        if Plain.serves(self.problem):
+            if self._plain is None or not self._plain.closes(q):
+                self._plain = Plain(self.problem, self.times, q)
+            told = _told(self._plain, q, self._plain.solve(q, cost, max_iterations=AT_ONCE, **self.options))
+            if told.converged:
+                return told
+        program = transcribe(self.problem, self.times, q, keep_off=keep_off)
+        return _told(program, q, program.solve(max_iterations=self.max_iterations, **self.options))
+
+
+def _told(program: Lifted, q: Array, answer: tuple[Array, Outcome, int]) -> Confirmation:
+    final, outcome, iterations = answer
+    moved, left = float(np.abs(final - q).max()), residuals(program.drake, outcome.result, program.functions)
     return Confirmation(final, outcome.converged, outcome.status, iterations, outcome.wall_time, moved, *left)

@@ -71,7 +71,7 @@ def solve(
     result = solver.Solve(program, guess, options)
     wall_time = time.perf_counter() - start
     details = result.get_solver_details()
-    x = result.GetSolution(program.decision_variables())
+    x: Array = result.get_x_val()
     status = details.ConvertStatusToString().lower()
     status = STOPPED if "time exceeded" in status else status
     return Outcome(x, status in CONVERGED, status, wall_time, result)

@@ -17,10 +17,11 @@ from pipeline.common.arrays import Array
 from pipeline.problem.lagrangian import Lagrangian
 from pipeline.problem.problem import Boundary, Problem
 from pipeline.program import ipopt
-from pipeline.program.differentiable import DifferentiableConstraint
+from pipeline.program.differentiable import DifferentiableConstraint, DifferentiableCost
 from pipeline.program.scaling import POSITION_SCALE, Guess, Scaling, Sums, lifted, scale
 
 KNOTS_PER_BINDING = 10  # a Python binding pays for its size squared: more, smaller bindings are cheaper up to a point
+POSITIONS_PER_BINDING = 20  # of knots whose positions alone it takes
 
 
 Block = NDArray[np.int_]
@@ -66,6 +67,7 @@ class Lifted:
         self.drake = MathematicalProgram()
         self._unknowns: dict[str, NDArray[Any]] = {}
         self._rows: list[DifferentiableConstraint] = []
+        self.functions: dict[Any, DifferentiableCost | DifferentiableConstraint] = {}  # by evaluator
         self.y = self.new("y", POSITION_SCALE * guess)
 
     def new(self, name: str, start: Array) -> NDArray[Any]:
@@ -83,7 +85,13 @@ class Lifted:
         rows = DifferentiableConstraint(function)
         binding = self.drake.AddConstraint(rows, lb=target, ub=target, vars=unknowns)
         binding.evaluator().SetGradientSparsityPattern(pattern)
+        self.functions[binding.evaluator()] = rows
         self._rows.append(rows)
+
+    def add_cost(self, function: Callable[[Array], tuple[float, Array]], unknowns: Any) -> None:
+        """function(x) -> (value, gradient) is part of the objective."""
+        cost = DifferentiableCost(function)
+        self.functions[self.drake.AddCost(cost, vars=unknowns).evaluator()] = cost
 
     def keep_within(self, kind: str, low: Array, high: Array, unknowns: Any, slack: Array, rows: Any = None) -> None:
         """low <= rows @ unknowns <= high; as bounds where it can be, and softened by excess * slack if elastic."""
@@ -103,11 +111,11 @@ class Lifted:
         everything = np.concatenate([unknowns, self["excess"]])
         self.drake.AddConstraint(LinearConstraint(both[used], free, above[used]), everything)
 
-    def run(self, **options: Any) -> tuple[ipopt.Outcome, int]:
-        """Solve from the guess: IPOPT's outcome and its iterations."""
-        for rows in self._rows:
-            rows.forget()
-        outcome = ipopt.solve(self.drake, self.drake.initial_guess(), **options)
+    def run(self, *, guess: Array | None = None, **options: Any) -> tuple[ipopt.Outcome, int]:
+        """Solve from the unknowns' starts, or from `guess`: IPOPT's outcome and its iterations."""
+        for function in self.functions.values():
+            function.forget()
+        outcome = ipopt.solve(self.drake, self.drake.initial_guess() if guess is None else guess, **options)
         # IPOPT linearises every row once per iteration: any of them can tell how many there were.
         return outcome, self._rows[0].iterations
 
@@ -138,7 +146,6 @@ class Program(Lifted):
         return self.read(outcome, self.y) / POSITION_SCALE, outcome, iterations
 
 
-def blocks(first: int, end: int) -> list[Block]:
+def blocks(first: int, end: int, knots: int = KNOTS_PER_BINDING) -> list[Block]:
     """The numbers from `first` to before `end`, as many at a time as one binding serves."""
-    starts = range(first, end, KNOTS_PER_BINDING)
-    return [np.arange(start, min(start + KNOTS_PER_BINDING, end)) for start in starts]
+    return [np.arange(start, min(start + knots, end)) for start in range(first, end, knots)]

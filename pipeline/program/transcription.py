@@ -32,6 +32,7 @@ TERMS: tuple[Term, ...] = (
     torque.lift,
     base.momentum,
     limits.give_way,
+    limits.positions,
     limits.joints,
     base.attitude,
     energy.quadratic,

@@ -1,4 +1,4 @@
-"""What a run says on the terminal: progress while it works, the result and where it lies at the end."""
+"""What a run says on the terminal: progress while it works, then the result, and at the end where it lies."""
 
 from __future__ import annotations
 
@@ -55,8 +55,8 @@ class Console:
 
         return show
 
-    def report(self, summary: pd.DataFrame, results: Iterable[Result], folder: Path) -> None:
-        """The table of the motions, what there is to say of each, what the studies say, and where it all lies."""
+    def report(self, summary: pd.DataFrame, results: Iterable[Result]) -> None:
+        """The table of the motions, what there is to say of each, and what the studies say."""
         table = Table(box=None, header_style="bold")
         for title in (
             "method",
@@ -81,4 +81,7 @@ class Console:
                 self.console.print(f"{row['method']}: {row['evidence']}", soft_wrap=True)
         for line in (line for result in results for line in result.said()):
             self.console.print(line, soft_wrap=True, markup=False)
+
+    def where(self, folder: Path) -> None:
+        """Where it all lies."""
         self.console.print(f"results in {folder}", soft_wrap=True)

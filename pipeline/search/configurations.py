@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.stats import qmc
 
 from pipeline.common.arrays import Array
 from pipeline.common.errors import InputError
@@ -50,6 +49,8 @@ def random_configurations(
         elif kind == "normal":
             velocity = rng.normal(scale=np.pi, size=(count, n))
         else:
+            from scipy.stats import qmc  # takes a quarter of a second to import
+
             velocity = 2 * np.pi * (2 * qmc.LatinHypercube(n, rng=rng).random(count) - 1)
         for _ in range(0 if kind == "uniform" else steps):
             error, jacobian = task.error_and_jacobian(q, x)

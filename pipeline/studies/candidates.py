@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 import pandas as pd
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 
 from pipeline.common.arrays import Array
 from pipeline.config.methods import GlobalOptions
@@ -20,6 +18,9 @@ from pipeline.search.configurations import starting_points
 from pipeline.search.population import population
 from pipeline.studies import style
 from pipeline.studies.study import Motions, Result
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 PRINTED = (-4.0733, -0.2030)  # eq. (16): logarithm of the factor, exponent
 
@@ -84,8 +85,7 @@ def measure(
 
 def draw(study: Candidates, title: str) -> Figure:
     """The mean curve, its fitted power law and the printed one, on logarithmic axes (Fig. 1)."""
-    figure = Figure(figsize=(7.0, 4.6), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = style.sheet(7.0, 4.6)
     axes = figure.add_subplot()
     axes.loglog(study.count, study.distance, ".-", color=style.color("global"), label="mean over populations")
     tail = study.count[study.count >= study.parameters].astype(float)

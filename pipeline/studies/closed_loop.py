@@ -8,11 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import BodyIndex, SpatialInertia
@@ -32,6 +30,9 @@ from pipeline.problem.problem import Problem
 from pipeline.studies import style
 from pipeline.studies.export import chosen
 from pipeline.studies.study import Motions, Result
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 DIVERGED = 3.0  # [rad] of a joint from its reference: the simulation is stopped
 ACCURACY = 1e-6
@@ -222,8 +223,7 @@ def _heavier(plant: Any, factor: float) -> Any:
 
 def draw(loop: ClosedLoop, title: str) -> Figure:
     """Joint and end-effector errors, and torques relative to their limits (in N m without any); saturation shaded."""
-    figure = Figure(figsize=(9.0, 7.5), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = style.sheet(9.0, 7.5)
     panels = figure.subplots(3, 1, sharex=True)
     thin = slice(None, None, max(1, len(loop.time) // POINTS))
     time = loop.time[thin]

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 import pandas as pd
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 
 from pipeline.common.arrays import Array
 from pipeline.common.markdown import cells, markdown_table
@@ -17,6 +15,9 @@ from pipeline.evaluation.evaluation import Evaluation
 from pipeline.problem.integrals import INTEGRALS
 from pipeline.studies import style
 from pipeline.studies.study import Motions, Result
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 EQUAL = 1e-6  # relative: costs closer than this are the same
 FEW = 4  # motions between the extremes that figures show one by one
@@ -141,8 +142,7 @@ def hypervolume(values: Array) -> float:
 def draw(front: Front, name: str) -> Figure:
     """Both axes labelled, extremes and knee marked, classes by colour, dominated points apart."""
     (x, y), good, table = front.objectives, front.good.sort_values(front.objectives[0]), front.table
-    figure = Figure(figsize=(7.4, 5.4), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = style.sheet(7.4, 5.4)
     axes = figure.add_subplot()
     axes.step(good[x], good[y], where="post", color="0.8", linewidth=1.0, zorder=1, label="dominated region's edge")
     for number in range(1, int(good["path_class"].max()) + 1):

@@ -13,14 +13,11 @@ import xml.etree.ElementTree as ET
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 import pandas as pd
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 from scipy.optimize import least_squares
-from scipy.stats import t as student
 
 from pipeline.build.problem import prepare
 from pipeline.common.arrays import Array
@@ -46,7 +43,10 @@ from pipeline.robot.description import Description
 from pipeline.studies import style
 from pipeline.studies.study import Motions, Result
 
-FEW = GlobalOptions(starts="population", candidates=200, optimised=12)
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+FEW = GlobalOptions(starts="population", candidates=60, optimised=12)
 ROUNDS = 5  # of fits, at most, each from the optima at the masses of the one before
 SETTLED = 1e-4  # relative: masses that change less are found
 STEP = 1e-3  # relative, of the differences by the masses
@@ -143,6 +143,8 @@ def identify(arm: Arm, config: IdentificationConfig, seed: int, workers: Workers
     freedom = len(fitted) - len(masses)
     variance = max(1.0, float((fit.fun**2).sum()) / freedom)
     spread = np.sqrt(variance * np.diag(np.linalg.inv(fit.jac.T @ fit.jac)))
+    from scipy.stats import t as student  # takes a quarter of a second to import
+
     spread *= student.ppf((1 + config.confidence) / 2, freedom)
     table = pd.DataFrame(
         {
@@ -305,8 +307,7 @@ def draw(found: Identification, title: str) -> Figure:
     """Residuals of every number, in units of its rounding, on a logarithmic scale on both sides of zero."""
     numbers = found.numbers.iloc[::-1]
     place = np.arange(len(numbers))
-    figure = Figure(figsize=(9.0, 0.27 * len(numbers) + 1.8), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = style.sheet(9.0, 0.27 * len(numbers) + 1.8)
     axes = figure.add_subplot()
     axes.axvspan(-1, 1, color="#E2E8F0", zorder=0, label="rounding of the printed digits")
     for column, method, label, marker in (

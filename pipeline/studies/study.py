@@ -9,16 +9,18 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import pandas as pd
-from matplotlib.figure import Figure
 
 from pipeline.common.workers import Workers
 from pipeline.config.run import RunConfig
 from pipeline.evaluation.evaluation import Evaluation
 from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Status
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True)

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import colorsys
+from typing import TYPE_CHECKING
 
 from pipeline.methods.registry import METHODS
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 # Joints 1, 2, 3 are blue, red and yellow in the papers; the others keep apart from them and from one another.
 JOINT_COLORS = ("#1F5FBF", "#C62828", "#D9A400", "#2E8B57", "#7B3FA0", "#00838F", "#8D5524", "#D81B7A", "#5A6472")
@@ -45,3 +49,13 @@ def name(label: str) -> str:
 def joint_color(joint: int) -> str:
     """The colour `#RRGGBB` of joint 0, 1, ...: the table is run through again after its end."""
     return JOINT_COLORS[joint % len(JOINT_COLORS)]
+
+
+def sheet(width: float, height: float) -> Figure:
+    """An empty figure of this size [inch]. Whoever draws nothing does not wait for matplotlib."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure

@@ -7,7 +7,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from tests.commands import call, command
+from tests.commands import call
 from tests.reports import leave_out_pictures
 
 pytestmark = pytest.mark.slow
@@ -23,14 +23,18 @@ def words_of(file: Path) -> pd.DataFrame:
     return pd.read_csv(file).astype(object).fillna("")
 
 
-def test_a_sweep_leaves_one_table(tmp_path: Path) -> None:
-    answer = command(
+def test_a_sweep_leaves_one_table(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    answer = call(
+        monkeypatch,
+        capfd,
         "-m",
         "+experiment=traj1,traj2",
         "methods=[lsv]",
         "method.lsv.dt=0.05",
         f"hydra.sweep.dir={tmp_path}/all",
-        folder=tmp_path,
     )
     assert answer.code == 0, answer.error
     assert answer.error == ""

@@ -14,7 +14,6 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from pipeline.build.problem import prepare
-from pipeline.common.arrays import Array
 from pipeline.config.methods import GlobalOptions, PmkeOptions
 from pipeline.config.run import check
 from pipeline.methods.global_planner.grids import refinement
@@ -22,11 +21,10 @@ from pipeline.methods.global_planner.planner import STEPS, global_planner
 from pipeline.methods.pmke.predictive import pmke
 from pipeline.methods.pmke.window import Window
 from pipeline.problem.lagrangian import Lagrangian
-from pipeline.problem.problem import Problem
-from pipeline.program.confirm import Confirmation, confirm
+from pipeline.program.confirm import Confirm, Confirmation
 from pipeline.program.newton.newton import WARM
 from pipeline.program.newton.serve import Solver
-from tests.benchmarks import bound, peer, planner
+from tests.benchmarks import bound, peer, planner, scaling
 
 REPEATS = 7
 
@@ -39,7 +37,7 @@ def timed(call: Callable[[], Any]) -> tuple[float, Any]:
 
 def report(name: str, ours: list[float], theirs: list[float], note: str) -> None:
     ratio = np.median(np.array(ours) / np.array(theirs))
-    print(f"{name:<34} {np.median(ours):9.2f} {np.median(theirs):9.2f} {ratio:7.2f}   {note}")
+    print(f"{name:<40} {np.median(ours):9.2f} {np.median(theirs):9.2f} {ratio:7.2f}   {note}")
 
 
 def predictions(repeats: int = REPEATS) -> None:
@@ -59,7 +57,7 @@ def predictions(repeats: int = REPEATS) -> None:
 
     window = Window(Lagrangian(problem.task, problem.objective), options.horizon, options.prediction_step)
     arm = peer.PlanarArm.from_urdf(peer.ROBOT)
-    program = peer.kinetic_energy_program(arm, options.horizon, options.prediction_step, options.tolerance)
+    program = peer.kinetic_energy_program(arm, options.horizon, options.prediction_step, options.tolerance, expand=True)
     ours, theirs, gap = [], [], 0.0
     for _ in range(repeats):
         for call in calls:
@@ -71,49 +69,64 @@ def predictions(repeats: int = REPEATS) -> None:
     report("PMKE prediction (trajectory 3)", ours, theirs, f"{len(calls)} solves of one run; costs agree to {gap:.0e}")
 
 
-def fine_solve(repeats: int = REPEATS) -> None:
-    """The last stage of the global planner on trajectory 3, IPOPT's confirmation included: 101 points, 303 parameters,
-    from the spline of the stage before; processor time.
+def fine_solve(repeats: int = REPEATS, steps: int = 100) -> None:
+    """The last stage of the global planner on trajectory 3 from the spline of the stage before, IPOPT's confirmation
+    included; processor time. The peer expanded to SX, and as it is first written, in MX.
     """
-    problem = prepare(check({}))
-    options = GlobalOptions(refine_to=None)
+    problem = prepare(check({"timing": {"steps": steps}}))
+    options = GlobalOptions(refine_to=None, optimised=8, budget=8)
     coarse = refinement(problem.times, STEPS)[-2]
     rough = global_planner(prepare(check({"timing": {"steps": len(coarse) - 1}})), options)[0]
     guess = CubicSpline(coarse, rough.trajectory.q)(problem.times)
     arm = peer.PlanarArm.from_urdf(peer.ROBOT)
     step = float(problem.times[1])
-    program = peer.kinetic_energy_program(arm, len(problem.times) - 1, step, options.tolerance)
-    path = problem.reference.position(problem.times[1:])
-    ours, theirs = [], []
+    intervals, path = len(problem.times) - 1, problem.reference.position(problem.times[1:])
+    programs = [
+        peer.kinetic_energy_program(arm, intervals, step, options.tolerance, expand=expand) for expand in (True, False)
+    ]
+    newton = Solver(problem).on(problem.times)
+    confirm = Confirm(problem, problem.times, options.tolerance, options.max_iterations)
+
+    def fine() -> Confirmation:
+        found = newton.solve(guess[None], WARM)
+        return confirm(found.q[0], float(found.cost[0]))
+
+    ours, theirs = [], ([], [])
     for _ in range(repeats):
-        milliseconds, told = timed(lambda: _fine(problem, guess, options))
+        milliseconds, told = timed(fine)
         ours.append(milliseconds)
-        milliseconds, (other, _, statistics) = timed(lambda: peer.solve(program, problem.q_init, path, guess[1:]))
-        theirs.append(milliseconds)
+        for program, all_times in zip(programs, theirs, strict=True):
+            milliseconds, (other, _, statistics) = timed(
+                lambda program=program: peer.solve(program, problem.q_init, path, guess[1:])
+            )
+            all_times.append(milliseconds)
     gap = np.abs(told.q[1:] - other).max()
     note = f"{told.iterations} and {statistics['iter_count']} iterations of IPOPT; motions agree to {gap:.0e} rad"
-    report("fine global solve (303 parameters)", ours, theirs, note)
+    for form, milliseconds in zip(("SX", "MX"), theirs, strict=True):
+        report(f"fine solve ({problem.times.size} knots), peer in {form}", ours, milliseconds, note)
 
 
-def _fine(problem: Problem, guess: Array, options: GlobalOptions) -> Confirmation:
-    """By Newton's method, confirmed by IPOPT: as the planner does it."""
-    found = Solver(problem).on(problem.times).solve(guess[None], WARM).q[0]
-    return confirm(problem, problem.times, found, tolerance=options.tolerance, max_iterations=options.max_iterations)
+def small() -> None:
+    """Solves of one program."""
+    print(f"{'medians':<40} {'ours [ms]':>9} {'peer [ms]':>9} {'ratio':>7}")
+    predictions()
+    fine_solve()
+
+
+PARTS: dict[str, Callable[[list[str]], None]] = {
+    "small": lambda _: small(),
+    "planner": planner.main,
+    "scaling": scaling.main,
+    "bound": bound.main,
+}
 
 
 def main(words: list[str]) -> None:
-    """Small programs and whole plans, or only `small` or `planner`, of that only the simulations named; or `bound`."""
-    if words and words[0] not in ("small", "planner", "bound"):
-        sys.exit(f"{words[0]}: not one of small, planner, bound")
-    if words[:1] == ["bound"]:
-        bound.main(words[1:])
-        return
-    if words[:1] != ["planner"]:
-        print(f"{'medians':<34} {'ours [ms]':>9} {'peer [ms]':>9} {'ratio':>7}")
-        predictions()
-        fine_solve()
-    if words[:1] != ["small"]:
-        planner.main(words[1:])
+    """Small programs, whole plans and how they scale; or one part, and of that only what is named behind it."""
+    if words and words[0] not in PARTS:
+        sys.exit(f"{words[0]}: not one of {', '.join(PARTS)}")
+    for part in words[:1] or ["small", "planner", "scaling"]:
+        PARTS[part](words[1:])
 
 
 if __name__ == "__main__":

@@ -9,7 +9,7 @@ from __future__ import annotations
 import xml.etree.ElementTree as ET
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import casadi as ca
 import numpy as np
@@ -47,6 +47,13 @@ class PlanarArm:
             value("inertial/inertia", "izz"),
         )
 
+    @property
+    def n(self) -> int:
+        return len(self.length)
+
+    def rows(self, q: ca.SX, target: ca.SX) -> ca.SX:
+        return self.end_effector(q) - target
+
     def end_effector(self, q: ca.MX) -> ca.MX:
         angle = ca.cumsum(q)
         return ca.vertcat(ca.dot(self.length, ca.cos(angle)), ca.dot(self.length, ca.sin(angle)))
@@ -69,8 +76,13 @@ class PlanarArm:
         return ca.jtimes(momentum, qd, qdd) + ca.jtimes(momentum, q, qd) - ca.gradient(energy, q)
 
 
-def kinetic_energy_program(arm: PlanarArm, intervals: int, dt: float, tolerance: float = 1e-8) -> ca.Function:
-    """nlpsol over q_1..q_N (N n,), parameters q_0 and the path (2 N); backward differences, M at the interval's end."""
+def kinetic_energy_program(
+    arm: PlanarArm, intervals: int, dt: float, tolerance: float = 1e-8, *, expand: bool = False
+) -> ca.Function:
+    """nlpsol over q_1..q_N (N n,), parameters q_0 and the path (2 N); backward differences, M at the interval's end.
+
+    expand: SX graphs in place of MX, which take half the time to evaluate and longer to build.
+    """
     n = len(arm.length)
     state, rate = ca.SX.sym("q", n), ca.SX.sym("qd", n)
     energy = ca.Function("T", [state, rate], [arm.kinetic_energy(state, rate)])
@@ -80,7 +92,7 @@ def kinetic_energy_program(arm: PlanarArm, intervals: int, dt: float, tolerance:
     cost = ca.sum2(energy.map(intervals)(q, (q - before) / dt)) * dt
     rows = ca.vec(tip.map(intervals)(q) - path)
     program = {"x": ca.vec(q), "p": ca.vertcat(start, ca.vec(path)), "f": cost, "g": rows}
-    return ca.nlpsol("peer", "ipopt", program, {**QUIET, "ipopt.tol": tolerance})
+    return ca.nlpsol("peer", "ipopt", program, {**QUIET, "expand": expand, "ipopt.tol": tolerance})
 
 
 def solve(program: ca.Function, start: Array, path: Array, guess: Array) -> tuple[Array, float, dict]:
@@ -89,69 +101,94 @@ def solve(program: ca.Function, start: Array, path: Array, guess: Array) -> tupl
     return np.array(result["x"]).reshape(guess.shape), float(result["f"]), program.stats()
 
 
+class Arm(Protocol):
+    """What `Program` asks of an arm, all in CasADi's symbols."""
+
+    n: int
+
+    def kinetic_energy(self, q: ca.SX, qd: ca.SX) -> ca.SX:
+        """[J]."""
+
+    def inverse_dynamics(self, q: ca.SX, qd: ca.SX, qdd: ca.SX) -> ca.SX:
+        """(n,) [N m], without gravity."""
+
+    def rows(self, q: ca.SX, target: ca.SX) -> ca.SX:
+        """(m,): zero where the end effector is as the target says."""
+
+
 @dataclass
 class Program:
     """min of the integral of T or |tau|^2 over q_0..q_N by backward differences, on even knots, with the limits given.
 
-    boundary: free (from rest, q_0 unknown) or cyclic (q_N = q_0, and the velocity before the first knot is the last).
-    limits: lower, upper, velocity, torque, power, one (n,) each. options: IPOPT's, without the prefix.
-    Of the options tried (scalings, starting barriers, barrier strategies, SX and MX graphs) the one expanded to SX is
+    boundary: fixed (q_0 given), free (from rest, q_0 unknown) or cyclic (q_N = q_0, and the velocity before the first
+    knot is the last). limits: lower, upper, velocity, torque, power, one (n,) each. options: IPOPT's, without the
+    prefix. Of those tried (scalings, starting barriers, barrier strategies, SX and MX graphs) the expansion to SX is
     the fastest, by up to a factor of two, and a small starting barrier finds the best optima from the same starts.
     """
 
-    arm: PlanarArm
+    arm: Arm
     times: Array
-    path: Array  # (N + 1, 2)
+    path: Array  # (N + 1, coordinates of a target)
+    start: Array  # (n,)
     torque: bool
-    cyclic: bool
+    boundary: str
     limits: tuple[Array, Array, Array, Array, Array]
     options: dict[str, Any]
 
     def __post_init__(self) -> None:
-        n, intervals = len(self.arm.length), len(self.times) - 1
+        n, intervals = self.arm.n, len(self.times) - 1
         dt = float(self.times[-1] - self.times[0]) / intervals
         lower, upper, velocity, torque, power = self.limits
+        self.first, cyclic = int(self.boundary == "fixed"), self.boundary == "cyclic"
+        self.last = intervals if cyclic else intervals + 1  # unknown are the knots from `first` to before it
         state, rate, acceleration = (ca.SX.sym(name, n) for name in ("q", "qd", "qdd"))
-        energy = self.arm.kinetic_energy(state, rate)
-        tau = self.arm.inverse_dynamics(state, rate, acceleration)
-        term = ca.sumsqr(tau) if self.torque else energy
-        kept = [(rate, velocity), (tau, torque), (tau * rate, power)]
+        kept = [(rate, velocity)]
+        if self.torque or np.isfinite([torque, power]).any():
+            tau = self.arm.inverse_dynamics(state, rate, acceleration)
+            kept += [(tau, torque), (tau * rate, power)]
+        term = ca.sumsqr(tau) if self.torque else self.arm.kinetic_energy(state, rate)
         limited = [(quantity[i], bound[i]) for quantity, bound in kept for i in range(n) if np.isfinite(bound[i])]
         stage = ca.Function("stage", [state, rate, acceleration], [term, ca.vertcat(*(row for row, _ in limited))])
-        tip = ca.Function("tip", [state], [self.arm.end_effector(state)])
+        target = ca.SX.sym("x", self.path.shape[1])
+        tip = ca.Function("tip", [state, target], [self.arm.rows(state, target)])
 
-        free = intervals if self.cyclic else intervals + 1  # knots that are unknown
+        free = self.last - self.first
         unknown, scale = ca.MX.sym("q", n, free), ca.MX.sym("scale")
-        q = ca.horzcat(unknown, unknown[:, 0]) if self.cyclic else unknown
+        q = unknown
+        if cyclic:
+            q = ca.horzcat(unknown, unknown[:, 0])
+        elif self.first:
+            q = ca.horzcat(ca.DM(self.start), unknown)
         qd = (q[:, 1:] - q[:, :-1]) / dt
-        qdd = (qd - ca.horzcat(qd[:, -1] if self.cyclic else ca.MX.zeros(n), qd[:, :-1])) / dt
+        qdd = (qd - ca.horzcat(qd[:, -1] if cyclic else ca.MX.zeros(n), qd[:, :-1])) / dt
         terms, rows = stage.map(intervals)(q[:, 1:], qd, qdd)
-        gaps = ca.vec(tip.map(free)(unknown) - self.path[:free].T)
+        gaps = ca.vec(tip.map(free)(unknown, ca.DM(self.path[self.first : self.last].T)))
         bound = np.tile([value for _, value in limited], intervals)
+        exact = np.zeros(gaps.shape[0])
         self.bounds = {
             "lbx": np.tile(lower, free),
             "ubx": np.tile(upper, free),
-            "lbg": np.concatenate([np.zeros(2 * free), -bound]),
-            "ubg": np.concatenate([np.zeros(2 * free), bound]),
+            "lbg": np.concatenate([exact, -bound]),
+            "ubg": np.concatenate([exact, bound]),
         }
         cost = ca.sum2(terms) * dt
         program = {"x": ca.vec(unknown), "p": scale, "f": cost / scale, "g": ca.vertcat(gaps, ca.vec(rows))}
         names = {f"ipopt.{key}": value for key, value in self.options.items()}
         self.solver = ca.nlpsol("peer", "ipopt", program, {**QUIET, "expand": True, **names})
         self.evaluate = ca.Function("evaluate", [program["x"]], [cost, program["g"]])
-        self.free = free
 
     def solve(self, guess: Array) -> tuple[Array, float, dict]:
         """q (N + 1, n), its cost, and CasADi's statistics; the objective is divided by its value at the guess."""
-        start = guess[: self.free].ravel()
+        start = guess[self.first : self.last].ravel()
         result = self.solver(x0=start, p=float(self.evaluate(start)[0]), **self.bounds)
-        q = np.array(result["x"]).reshape(self.free, -1)
+        q = np.array(result["x"]).reshape(self.last - self.first, -1)
         cost = float(self.evaluate(q.ravel())[0])
-        return (np.vstack([q, q[:1]]) if self.cyclic else q), cost, self.solver.stats()
+        before, after = [self.start] * self.first, [q[0]] * (len(guess) - self.last)
+        return np.vstack([*before, q, *after]), cost, self.solver.stats()
 
     def check(self, q: Array) -> tuple[float, float]:
         """The cost of q (N + 1, n) and by how much it misses its path or exceeds a limit, in their units."""
-        x = q[: self.free].ravel()
+        x = q[self.first : self.last].ravel()
         cost, rows = self.evaluate(x)
         parts = (
             (np.array(rows).ravel(), self.bounds["lbg"], self.bounds["ubg"]),

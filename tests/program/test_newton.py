@@ -1,4 +1,4 @@
-"""Newton's method for many motions: its parts beside dense algebra and differences, its optima beside IPOPT's."""
+"""Newton's method for many motions: its parts beside differences, its optima beside IPOPT's."""
 
 from __future__ import annotations
 
@@ -14,9 +14,8 @@ from pipeline.model.kernel.chain import Chain
 from pipeline.problem.costs import integrals, objective_values, velocities
 from pipeline.problem.objective import Objective
 from pipeline.problem.problem import Boundary, Problem
-from pipeline.program.confirm import confirm
-from pipeline.program.newton import stencils, triangular
-from pipeline.program.newton.banded import Banded
+from pipeline.program.confirm import Confirm
+from pipeline.program.newton import stencils
 from pipeline.program.newton.bounds import Bounds
 from pipeline.program.newton.clear import Clear
 from pipeline.program.newton.knots import Knots
@@ -24,69 +23,9 @@ from pipeline.program.newton.momentum import Momentum
 from pipeline.program.newton.newton import Newton
 from pipeline.program.newton.serve import Solver, why_not
 from pipeline.search.roadmap import Roadmap
-from tests.support import composed, differences
+from tests.support import composed, dense, differences
 
 BOUNDARIES = list(Boundary)
-
-
-def dense(blocks: tuple[Array, ...], cyclic: bool) -> Array:
-    """(U s, U s) of blocks (U, s, s) on the diagonal and above it."""
-    count, size = blocks[0].shape[:2]
-    out = np.zeros((count, size, count, size))
-    for apart, band in enumerate(blocks):
-        assert len(band) == (count if cyclic else count - apart)
-        for k, block in enumerate(band):
-            other = (k + apart) % count
-            out[k, :, other] += block
-            if apart:
-                out[other, :, k] += block.T
-    return out.reshape(count * size, count * size)
-
-
-@pytest.mark.parametrize("cyclic", [False, True])
-@pytest.mark.parametrize(("size", "reach"), [(1, 1), (2, 1), (3, 1), (1, 2), (2, 2)])
-def test_banded_systems(cyclic: bool, size: int, reach: int, rng: np.random.Generator) -> None:
-    count = 7
-    diagonal = rng.normal(size=(2, count, size, size))
-    diagonal = diagonal + diagonal.swapaxes(-1, -2) + 8 * reach * size * np.eye(size)
-    off = [rng.normal(size=(2, count if cyclic else count - j, size, size)) for j in range(1, reach + 1)]
-    blocks, right = (diagonal, *off), rng.normal(size=(2, count, size))
-    band, knots = Banded(count, size, cyclic, reach), Knots(Boundary.CYCLIC if cyclic else Boundary.FIXED, np.arange(8))
-    x, _, changed = band.solve(band.assemble(blocks), np.empty(0), right)
-    assert changed == 0
-    rows, target = rng.normal(size=(2, 4, count * size)), rng.normal(size=(2, 4))
-    tied, nu, _ = band.solve(band.assemble(blocks), np.empty(0), right, rows, target)
-    for s in range(2):
-        whole = dense(tuple(block[s] for block in blocks), cyclic)
-        np.testing.assert_allclose(x[s].ravel(), np.linalg.solve(whole, right[s].ravel()), atol=1e-12)
-        np.testing.assert_allclose(knots.product(blocks, right)[s].ravel(), whole @ right[s].ravel(), atol=1e-12)
-        both = np.block([[whole, rows[s].T], [rows[s], np.zeros((4, 4))]])
-        exact = np.linalg.solve(both, np.concatenate([right[s].ravel(), target[s]]))
-        np.testing.assert_allclose(np.concatenate([tied[s].ravel(), nu[s]]), exact, atol=1e-10)
-
-
-def test_an_indefinite_system_fades_into_a_positive_one(rng: np.random.Generator) -> None:
-    band = Banded(5, 1, False)
-    bad, good = -np.ones((1, 5, 1, 1)), 2 * np.ones((1, 5, 1, 1))
-    off = np.zeros((1, 4, 1, 1))
-    right = rng.normal(size=(1, 5, 1))
-    x, _, changed = band.solve(band.assemble((bad, off)), band.assemble((good, off)), right)
-    assert changed == 1
-    np.testing.assert_allclose(x, right / (0.4 * -1 + 0.6 * 2))
-
-
-def test_null_spaces_and_triangular_systems(rng: np.random.Generator) -> None:
-    rows, b = rng.normal(size=(4, 3, 6)), rng.normal(size=(6, 3))  # J' of six knots
-    R, Q = triangular.split(rows)
-    np.testing.assert_allclose(np.einsum("ijk,ilk->kjl", Q, Q), np.tile(np.eye(4), (6, 1, 1)), atol=1e-14)
-    np.testing.assert_allclose(
-        np.einsum("ijk,jlk->ilk", Q[:, :3], np.triu(np.ones((3, 3)))[:, :, None] * R), rows, atol=1e-14
-    )
-    np.testing.assert_allclose(np.einsum("ijk,ik->jk", rows, Q[:, 3]), 0.0, atol=1e-14)
-    upper = np.triu(R.transpose(2, 0, 1))
-    np.testing.assert_allclose(triangular.backward(upper, b), np.linalg.solve(upper, b[:, :, None])[:, :, 0])
-    lower = upper.swapaxes(1, 2)
-    np.testing.assert_allclose(triangular.forward(upper, b), np.linalg.solve(lower, b[:, :, None])[:, :, 0])
 
 
 def small(boundary: Boundary, *words: str) -> Problem:
@@ -265,7 +204,7 @@ def test_ipopt_confirms_every_optimum(name: str) -> None:
     assert answer.converged.sum() > 5
     costs = answer.cost[answer.converged]
     for s in np.flatnonzero(answer.converged)[[np.argmin(costs), np.argmax(costs)]]:
-        told = confirm(problem, problem.times, answer.q[s], tolerance=1e-8, max_iterations=20)
+        told = Confirm(problem, problem.times, 1e-8, 20)(answer.q[s], answer.cost[s])
         assert told.converged
         assert told.iterations <= 2
         assert told.moved < 1e-6
@@ -279,8 +218,9 @@ def test_ipopt_confirms_an_optimum_beside_an_obstacle() -> None:
     starts = Roadmap(problem, problem.times, np.random.default_rng(1), nodes=60).cheapest(4)
     answer = Solver(problem).on(problem.times).solve(starts)
     assert answer.converged.sum() >= 2
-    q = answer.q[np.flatnonzero(answer.converged)[np.argmin(answer.cost[answer.converged])]]
-    told = confirm(problem, problem.times, q, tolerance=1e-8, max_iterations=20)
+    best = np.flatnonzero(answer.converged)[np.argmin(answer.cost[answer.converged])]
+    q = answer.q[best]
+    told = Confirm(problem, problem.times, 1e-8, 20)(q, answer.cost[best])
     assert told.converged
     assert told.iterations <= 5
     assert told.moved < 1e-6
@@ -294,8 +234,9 @@ def best_confirmed(problem: Problem, nodes: int, most: int) -> Array:
     starts = Roadmap(problem, problem.times, np.random.default_rng(1), nodes=nodes).cheapest(4)
     answer = Solver(problem).on(problem.times).solve(starts)
     assert answer.converged.any()
-    q: Array = answer.q[np.flatnonzero(answer.converged)[np.argmin(answer.cost[answer.converged])]]
-    told = confirm(problem, problem.times, q, tolerance=1e-8, max_iterations=20)
+    best = np.flatnonzero(answer.converged)[np.argmin(answer.cost[answer.converged])]
+    q: Array = answer.q[best]
+    told = Confirm(problem, problem.times, 1e-8, 20)(q, answer.cost[best])
     assert told.converged
     assert told.iterations <= most
     assert told.moved < 1e-6
@@ -344,3 +285,20 @@ def test_what_is_not_served_has_a_reason() -> None:
     assert "obstacles and torques" in str(why_not(obstacle))
     for words, word in ((("boundary=free",), "not fixed"), (("objective=base_rotation",), "rotation")):
         assert word in str(why_not(prepare(composed("+experiment=floating3r", *words))))
+
+
+def test_starts_that_will_be_dear_are_given_up() -> None:
+    """Earlier than they converge, and none but those; what is cheap ends as it does without."""
+    problem = prepare(composed("+experiment=sim1", "timing.steps=12"))
+    starts = Roadmap(problem, problem.times, np.random.default_rng(1), nodes=60).random(48)
+    newton = Solver(problem).on(problem.times)
+    whole = newton.solve(starts)
+    most = 1.5 * whole.cost[whole.converged].min()
+    some = newton.solve(starts, dear=most)
+    assert 5 < some.dear.sum() < 43
+    assert not (some.dear & some.converged).any()
+    assert (whole.cost[some.dear] > most).all()
+    assert some.iterations[some.dear].sum() < 0.9 * whole.iterations[some.dear].sum()
+    cheap = whole.converged & (whole.cost < most)
+    assert some.converged[cheap].all()
+    np.testing.assert_allclose(some.cost[cheap], whole.cost[cheap], rtol=1e-10)

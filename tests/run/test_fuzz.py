@@ -153,7 +153,7 @@ def answers(
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("share", [0.02, pytest.param(0.3, marks=pytest.mark.slow)], ids=["few", "many"])
+@pytest.mark.parametrize("share", [0.02, pytest.param(0.16, marks=pytest.mark.slow)], ids=["few", "many"])
 def test_an_answer(kind: str, share: float, answers: Callable[[Example], int]) -> None:
     """`share` of the examples that the profile asks for."""
 

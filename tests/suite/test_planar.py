@@ -1,6 +1,11 @@
-"""The planner's default beside a brute-force search on thirty random problems (`planar.csv`, `planar.py`)."""
+"""The planner's default beside a brute-force search on ten of thirty random problems (`planar.csv`, `planar.py`).
+
+All thirty: python -m tests.suite.test_planar
+"""
 
 from __future__ import annotations
+
+from collections.abc import Iterable
 
 import pandas as pd
 import pytest
@@ -26,14 +31,25 @@ def found_of(name: str) -> tuple[list[float], list[float]]:
     ]
 
 
+def missed(names: Iterable[str]) -> tuple[list[str], int, int]:
+    """Problems whose best is not found, and how many of all known optima are, and are not."""
+    lost, listed, total = [], 0, 0
+    for name in names:
+        known, ours = found_of(name)
+        lost += [name] if not ours or ours[0] > known[0] * (1 + SAME) else []
+        listed += sum(any(abs(cost / other - 1) < SAME for other in ours) for cost in known)
+        total += len(known)
+    return lost, listed, total - listed
+
+
 @pytest.mark.slow
 def test_the_best_is_found_and_nearly_all_below_three_times_the_best() -> None:
-    listed = total = 0
-    for name in KNOWN["name"]:
-        known, ours = found_of(name)
-        assert ours, name
-        assert ours[0] <= known[0] * (1 + SAME), name
-        listed += sum(min(abs(cost / other - 1) for other in ours) < SAME for cost in known)
-        total += len(known)
     assert len(KNOWN) == sum(COUNTS.values())
-    assert listed >= 0.95 * total, f"{listed} of {total}"
+    lost, listed, not_listed = missed(KNOWN["name"][::3])
+    assert lost == []
+    assert listed >= 0.95 * (listed + not_listed), f"{not_listed} not found beside {listed}"
+
+
+if __name__ == "__main__":
+    lost, listed, not_listed = missed(KNOWN["name"])
+    print(f"best not found: {lost or 'of none'}; {listed} of {listed + not_listed} known optima found")

@@ -27,7 +27,7 @@ from pipeline.methods.global_planner.optimum import (
 )
 from pipeline.problem.costs import objective_values
 from pipeline.problem.problem import Problem
-from pipeline.program.confirm import confirm
+from pipeline.program.confirm import Confirm
 from pipeline.program.newton.newton import COLD, WARM, Barrier, Newton
 from pipeline.program.newton.serve import Solver, why_not
 
@@ -65,9 +65,9 @@ class Batch:
             f"; ipopt alone where torques matter ({self.alone})" if self.alone else ""
         )
 
-    def coarse(self, times: Array, guesses: Array) -> list[Optimum]:
-        """Of every guess (S, N + 1, n) the first-order problem's optimum on a coarse grid."""
-        return _solve(self.solver.on(times), guesses, COLD)
+    def coarse(self, times: Array, guesses: Array, dear: float = np.inf) -> list[Optimum]:
+        """Of every guess (S, N + 1, n) the first-order problem's optimum on a coarse grid; not if it costs `dear`."""
+        return _solve(self.solver.on(times), guesses, COLD, dear)
 
     def further(self, times: Array, firsts: list[Optimum]) -> list[Optimum | None]:
         """From the first-order problem's optima to those of the problem itself; None: lost, or not served."""
@@ -97,7 +97,9 @@ class Batch:
                     if first and self._has_jumped((on, before), (fine, finer)):
                         refined[k] = replace(finer or before, continuous=False)
             on = fine
-        return [optimum and self._finish(on, optimum) for optimum in refined]
+        given = self.options.tolerance, self.options.max_iterations
+        confirms = Confirm(self.first, on, *given), Confirm(self.problem, on, *given)
+        return [optimum and self._finish(on, optimum, *confirms) for optimum in refined]
 
     def _begun(self, times: Array, optimum: Optimum) -> Optimum | None:
         if self._suffices(times, optimum):
@@ -145,12 +147,12 @@ class Batch:
     def _whether_continuous(self, times: Array, optimum: Optimum, share: float) -> Optimum:
         return replace(optimum, continuous=stays_on_path(self.problem, times, optimum.q, share))
 
-    def _finish(self, times: Array, optimum: Optimum) -> Optimum | None:
+    def _finish(self, times: Array, optimum: Optimum, loose: Confirm, whole: Confirm) -> Optimum | None:
         """IPOPT's last word on an optimum; one that jumps between its knots is not worth it."""
         optimum = self._whether_continuous(times, optimum, STAYS) if optimum.continuous else optimum
         if not optimum.continuous:
             return optimum
-        options, keep_off, problem = self.options, 0.0, self.first if self._suffices(times, optimum) else self.problem
+        confirm, keep_off = loose if self._suffices(times, optimum) else whole, 0.0
         if self.first.obstacles is not None:
             optimum, keep_off = clear_between(
                 self.first.task.arm,
@@ -161,14 +163,7 @@ class Batch:
             )
             if not optimum.converged:
                 return None
-        told = confirm(
-            problem,
-            times,
-            optimum.q,
-            tolerance=options.tolerance,
-            max_iterations=options.max_iterations,
-            keep_off=keep_off,
-        )
+        told = confirm(optimum.q, optimum.cost, keep_off)
         entry = {"solver": "ipopt", "intervals": len(times) - 1, "iterations": told.iterations, "moved": told.moved}
         entry |= {"wall_time_s": told.wall_time, "status": told.status}
         entry |= {"violation": told.violation, "optimality": told.optimality}
@@ -176,17 +171,17 @@ class Batch:
             cost = float(objective_values(self.problem, times, told.q[None])[0])
             solves = [*optimum.solves, {**entry, "cost": cost}]
             return replace(optimum, q=told.q, cost=cost, status=told.status, solves=solves)
-        final = optimise(problem, times, optimum.q, options, keep_off)
+        final = optimise(confirm.problem, times, optimum.q, self.options, keep_off)
         final = replace(final, solves=[*optimum.solves, {**entry, "cost": optimum.cost}, *final.solves])
         return self._whether_continuous(times, final, STAYS) if final.converged else None
 
 
-def _solve(newton: Newton, guesses: Array, barrier: Barrier) -> list[Optimum]:
+def _solve(newton: Newton, guesses: Array, barrier: Barrier, dear: float = np.inf) -> list[Optimum]:
     """One batch; each start's share of its time is the same."""
-    answer = newton.solve(guesses, barrier)
+    answer = newton.solve(guesses, barrier, dear=dear)
     optima = []
-    for q, cost, converged, iterations, residual in zip(
-        answer.q, answer.cost, answer.converged, answer.iterations, answer.residual, strict=True
+    for q, cost, converged, iterations, residual, too_dear in zip(
+        answer.q, answer.cost, answer.converged, answer.iterations, answer.residual, answer.dear, strict=True
     ):
         good = bool(converged and residual <= ON_PATH)
         entry = {
@@ -194,7 +189,7 @@ def _solve(newton: Newton, guesses: Array, barrier: Barrier) -> list[Optimum]:
             "intervals": q.shape[0] - 1,
             "iterations": int(iterations),
             "wall_time_s": answer.wall_time / len(answer.q),
-            "status": "success" if good else "lost",
+            "status": "success" if good else "too dear" if too_dear else "lost",
             "cost": float(cost),
         }
         optima.append(Optimum(q, float(cost), good, str(entry["status"]), solves=[entry]))

@@ -141,6 +141,11 @@ class Motions:
         share, kept = self.terms.values(x, begin)
         return cost + share, error.reshape(len(x), -1, self.m), kept, self.ties.values(x, begin)
 
+    def missed(self, x: Array) -> Array:
+        """The path error (S, U, m) alone."""
+        at, target = self.chain.places(x.reshape(-1, self.n)), np.tile(self.target, (len(x), 1))
+        return self.rows.error(at, target).reshape(len(x), -1, self.m)
+
     def differentiate(self, x: Array, begin: Array) -> Point:
         """Everything at x (S, U, n)."""
         knots, n, S, U = self.knots, self.n, len(x), self.knots.count

@@ -18,10 +18,8 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.common.arrays import Array
 from pipeline.problem.limits import Limits
@@ -29,13 +27,15 @@ from pipeline.program.newton import stencils, triangular
 from pipeline.program.newton.banded import Banded
 from pipeline.program.newton.bounds import Bounds
 from pipeline.program.newton.inequalities import Inequalities
+from pipeline.program.newton.iterates import Answer, Mask, State, Step
 from pipeline.program.newton.knots import Blocks
-from pipeline.program.newton.motion import Motions, PerStart, Point
+from pipeline.program.newton.motion import Motions, Point
 
 FILTER = 16  # entries of each start's filter
 NEAR = 1e-7  # relative: where rounding decides, a full step is taken without question
 LONGEST = 0.7  # [rad] of a step at any joint and knot
 ON_PATH = 1e-5  # [m, rad] from where the last step is taken
+NEARLY, NEARLY_ON_PATH = 0.3, 1e-3  # of the cost, [m, rad]: so near an optimum, what it will cost is clear
 BARRIER_END = 1e-10
 COMPLEMENTARITY = 10.0  # times BARRIER_END: how far products of slack and multiplier may be from it
 FEASIBLE = 1e-9
@@ -56,62 +56,6 @@ class Barrier:
 COLD, WARM = Barrier(), Barrier(1e-6, 1e-3)  # warm: a spline of a coarser optimum is nearly optimal
 
 
-@dataclass
-class Answer:
-    """Per start: motions q (S, N + 1, n), cost (S,), converged, iterations (S,), the largest error of the path (S,),
-    and wall_time [s] of all.
-    """
-
-    q: Array
-    cost: Array
-    converged: NDArray[np.bool_]
-    iterations: NDArray[np.int_]
-    residual: Array
-    wall_time: float = 0.0
-
-
-@dataclass
-class State(PerStart):
-    """One iterate of every start: unknowns, slacks and multipliers of limits, the barrier, the filter."""
-
-    number: NDArray[np.int_]
-    x: Array
-    begin: Array
-    scale: Array
-    slack: Array
-    excess: Array
-    z: Array
-    mu: Array
-    nu: Array
-    seen_theta: Array
-    seen_phi: Array
-    short: NDArray[np.int_]
-    point: Point
-
-    def take(self, rows: NDArray[Any]) -> State:
-        point, self.point = self.point, self.number  # type: ignore[assignment]
-        part = super().take(rows)
-        part.point, self.point = point.take(rows), point
-        return part
-
-
-@dataclass
-class Step(PerStart):
-    """A direction: d (S, U, n), changes of slack, excess and multipliers (S, L), the predicted decrease; and of the
-    iterate the merit phi with its slope, and what is missed of path and slacks, theta.
-    """
-
-    d: Array
-    slack: Array
-    excess: Array
-    z: Array
-    nu: Array
-    decrement: Array
-    slope: Array
-    theta: Array
-    phi: Array
-
-
 class Newton:
     """Solves motions of one task on one grid; `limits`: of positions and velocities."""
 
@@ -120,18 +64,29 @@ class Newton:
         self.limits = Inequalities(Bounds(self.knots, limits), motions.terms.count, motions.terms.penalty)
         self.band = Banded(self.knots.count, motions.n - motions.m, self.knots.cyclic, motions.reach)
 
-    def solve(self, q: Array, barrier: Barrier = COLD, *, tolerance: float = 1e-10, max_iterations: int = 60) -> Answer:
-        """From motions q (S, N + 1, n); never raises for a start that fails."""
+    def solve(
+        self,
+        q: Array,
+        barrier: Barrier = COLD,
+        *,
+        dear: float = np.inf,
+        tolerance: float = 1e-10,
+        max_iterations: int = 60,
+    ) -> Answer:
+        """From motions q (S, N + 1, n); never raises for a start that fails. Without limits, a start is given up that
+        will cost more than `dear`: that is seen some iterations before it has converged.
+        """
         with np.errstate(all="ignore"):  # a start at a singularity fails alone
             begin = time.perf_counter()
-            answer = self._solve(np.array(q, dtype=float), barrier, tolerance, max_iterations)
+            answer = self._solve(np.array(q, dtype=float), barrier, dear, tolerance, max_iterations)
             answer.wall_time = time.perf_counter() - begin
             return answer
 
-    def _solve(self, q: Array, barrier: Barrier, tolerance: float, max_iterations: int) -> Answer:
+    def _solve(self, q: Array, barrier: Barrier, dear: float, tolerance: float, max_iterations: int) -> Answer:
         count = len(q)
         unknown = np.full(count, np.inf)
-        answer = Answer(q, unknown.copy(), np.zeros(count, bool), np.zeros(count, int), unknown.copy())
+        no, zero = np.zeros(count, bool), np.zeros(count, int)
+        answer = Answer(q, unknown.copy(), no.copy(), zero, unknown.copy(), no.copy())
         if not count:
             return answer
         state = self._begin(q, barrier)
@@ -139,21 +94,33 @@ class Newton:
             step = self._direction(state)
             done = self._converged(state, step, tolerance)
             lost = ~np.isfinite(step.decrement) | self._infeasible(state, step, tolerance)
-            state = self._advance(state, step, done | lost)
-            lost |= ~np.isfinite(state.point.cost) | (state.short > PATIENCE)
-            finished = done | lost
-            if iteration == max_iterations:
-                finished[:] = True
+            too_dear = self._will_cost(state, step) > dear
+            answer.dear[state.number] = too_dear
+            finished = done | lost | too_dear
             if finished.any():
-                who = state.number[finished]
-                answer.q[who] = self.knots.whole(state.x, state.begin)[finished]
-                answer.cost[who], answer.iterations[who] = state.point.cost[finished], iteration
-                answer.residual[who] = self._missed(state.point)[finished]
-                answer.converged[who] = (done & ~lost)[finished]
+                self._end(answer, state, step, iteration, finished, done & ~lost & ~too_dear)
                 if finished.all():
                     break
-                state = state.take(~finished)
+                state, step = state.take(~finished), step.take(~finished)
+            state = self._advance(state, step)
+            given_up = ~np.isfinite(state.point.cost) | (state.short > PATIENCE)
+            if iteration == max_iterations:
+                given_up[:] = True
+            if given_up.any():
+                self._end(answer, state, None, iteration, given_up, np.zeros_like(given_up))
+                if given_up.all():
+                    break
+                state = state.take(~given_up)
         return answer
+
+    def _end(self, answer: Answer, state: State, step: Step | None, iteration: int, who: Mask, converged: Mask) -> None:
+        """Starts that end, after one more step without question, which needs no derivatives any more."""
+        x = state.x if step is None else state.x + self._longest(state, step)[:, None, None] * step.d
+        x, begin, number = x[who], state.begin[who], state.number[who]
+        cost, error, _, tie = self.motions.value(x, begin)
+        answer.q[number], answer.iterations[number] = self.knots.whole(x, begin), iteration
+        answer.cost[number], answer.residual[number] = cost, self._missed(error, tie)
+        answer.converged[number] = converged[who] & np.isfinite(cost)
 
     def _begin(self, q: Array, barrier: Barrier) -> State:
         count, begin, x = len(q), self.knots.begin(q), self.knots.unknown(q)
@@ -243,27 +210,36 @@ class Newton:
         nu = nu.reshape(point.tie.shape)
         return within, nu, stencils.pull(self.knots, reduced, nu)
 
-    def _converged(self, state: State, step: Step, tolerance: float) -> NDArray[np.bool_]:
-        done = (step.decrement < tolerance) & (self._missed(state.point) < ON_PATH)
+    def _converged(self, state: State, step: Step, tolerance: float) -> Mask:
+        missed = self._missed(state.point.error, state.point.tie)
+        done = (step.decrement < tolerance) & (missed < ON_PATH)
         if self.limits:
             gap = np.abs(state.slack * state.z - state.mu[:, None]).max(axis=1)
             lack = np.maximum(np.abs(self._lack(state)), state.excess).max(axis=1)
             done &= (gap < COMPLEMENTARITY * BARRIER_END) & (state.mu <= BARRIER_END) & (lack < FEASIBLE)
         return done
 
-    @staticmethod
-    def _missed(point: Point) -> Array:
-        """The largest error (S,) of the path and of ties."""
-        return np.maximum(np.abs(point.error).max(axis=(1, 2)), np.abs(point.tie).max(axis=(1, 2), initial=0.0))
+    def _will_cost(self, state: State, step: Step) -> Array:
+        """What starts (S,) come to at least if they lose twice as much as a quadratic would; nothing where the model is
+        not yet to be trusted, and within limits, whose barrier costs too.
+        """
+        cost, fall = state.point.cost, step.decrement / state.scale
+        near = (fall < NEARLY * cost) & (self._missed(state.point.error, state.point.tie) < NEARLY_ON_PATH)
+        return np.where(near, cost - fall, 0.0) if not self.limits else np.zeros_like(cost)
 
-    def _infeasible(self, state: State, step: Step, tolerance: float) -> NDArray[np.bool_]:
+    @staticmethod
+    def _missed(error: Array, tie: Array) -> Array:
+        """The largest error (S,) of the path and of ties."""
+        return np.maximum(np.abs(error).max(axis=(1, 2)), np.abs(tie).max(axis=(1, 2), initial=0.0))
+
+    def _infeasible(self, state: State, step: Step, tolerance: float) -> Mask:
         beyond = state.excess.max(axis=1, initial=0.0) > BEYOND
         return (step.decrement < tolerance) & (state.mu <= BARRIER_END) & beyond if self.limits else beyond
 
     # --- the step -----------------------------------------------------------------------------------------------
 
-    def _advance(self, state: State, step: Step, last: NDArray[np.bool_]) -> State:
-        """The next iterate. The whole next point is computed at once, since full steps are the rule."""
+    def _longest(self, state: State, step: Step) -> Array:
+        """How much (S,) of a step may be taken."""
         towards = np.maximum(0.99, 1 - state.mu)
         reach = np.ones(len(state.x))
         if self.limits:
@@ -271,17 +247,21 @@ class Newton:
                 _fraction(state.slack, step.slack, towards), _fraction(state.excess, step.excess, towards)
             )
         alpha = np.minimum(reach, LONGEST / np.maximum(np.abs(step.d).max(axis=(1, 2)), triangular.TINY))
-        alpha = np.where(np.isfinite(alpha), alpha, 0.0)
+        return np.where(np.isfinite(alpha), alpha, 0.0)
+
+    def _advance(self, state: State, step: Step) -> State:
+        """The next iterate. The whole next point is computed at once, since full steps are the rule."""
+        alpha = self._longest(state, step)
         trial = state.x + alpha[:, None, None] * step.d
         point = self.motions.differentiate(trial, state.begin)
-        refused = self._refused(state, step, alpha, trial, point.cost, point.error, point.kept, point.tie) & ~last
+        refused = self._refused(state, step, alpha, trial, point.cost, point.error, point.kept, point.tie)
         searched = bad = np.flatnonzero(refused)
         for _ in range(TRIALS):
             if not len(bad):
                 break
             part, direction = state.take(bad), step.take(bad)
             straight = part.x + alpha[bad, None, None] * direction.d
-            missed = self.motions.value(straight, part.begin)[1]
+            missed = self.motions.missed(straight)
             bent = straight - (part.point.Y @ triangular.forward(part.point.R, missed)[..., None])[..., 0]
             trial[bad] = bent
             again = self._refused(part, direction, alpha[bad], bent, *self.motions.value(bent, part.begin))
@@ -297,6 +277,7 @@ class Newton:
         theta[:, 0], phi[:, 0] = oldest, step.phi
         if self.limits:
             slack, excess = slack + alpha[:, None] * step.slack, excess + alpha[:, None] * step.excess
+            towards = np.maximum(0.99, 1 - mu)
             dual = np.minimum(_fraction(z, step.z, towards), _fraction(self.limits.penalty - z, -step.z, towards))
             z = z + dual[:, None] * step.z
             # complementarity within a factor of its target (Waechter and Biegler, eq. (16))
@@ -305,7 +286,7 @@ class Newton:
                 1e-10 * mu[:, None] / slack,
                 np.minimum(1e10 * mu[:, None] / slack, (1 - 1e-12) * self.limits.penalty),
             )
-            near = self._missed(state.point) < 1e-4
+            near = self._missed(state.point.error, state.point.tie) < 1e-4
             solved = (step.decrement < 10 * mu) & near & (alpha > 0.3)
             mu = np.where(solved, np.maximum(BARRIER_END, np.minimum(0.1 * mu, mu**1.7)), mu)
             theta[mu < state.mu] = np.inf  # another barrier, another filter
@@ -314,7 +295,7 @@ class Newton:
 
     def _refused(
         self, state: State, step: Step, alpha: Array, trial: Array, cost: Array, error: Array, *others: Array
-    ) -> NDArray[Any]:
+    ) -> Mask:
         """Whether a trial neither lowers cost nor what is missed, against the iterate and against its filter."""
         kept, tie = others
         theta, phi = np.abs(error).sum(axis=(1, 2)) + np.abs(tie).sum(axis=(1, 2)), cost * state.scale

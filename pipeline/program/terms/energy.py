@@ -12,7 +12,6 @@ import numpy as np
 
 from pipeline.common.arrays import Array
 from pipeline.problem.lagrangian import trapezoid_weights
-from pipeline.program.differentiable import DifferentiableCost
 from pipeline.program.program import Block, Lifted, Rate, blocks
 from pipeline.program.scaling import POSITION_SCALE
 
@@ -25,7 +24,7 @@ def quadratic(program: Lifted) -> None:
         unknowns = np.concatenate([program.stations[block].ravel(), program.w[block].ravel()])
         weight = program.weights[block] / program.scaling.cost
         energy = weighted_sum(program, program.lagrangian.quadratic_gradient, block, weight)
-        program.drake.AddCost(DifferentiableCost(energy), vars=unknowns)
+        program.add_cost(energy, unknowns)
 
 
 def weighted_sum(program: Lifted, rate: Rate, block: Block, weight: Array) -> Callable[[Array], tuple[float, Array]]:
@@ -59,4 +58,4 @@ def _secondary(program: Lifted, knots: Block) -> None:
         value, by_q = program.lagrangian.gain(x.reshape(len(knots), program.n) / POSITION_SCALE)
         return -float(value @ weight), -(by_q * weight[:, None] / POSITION_SCALE).ravel()
 
-    program.drake.AddCost(DifferentiableCost(loss), vars=program.y[knots].ravel())
+    program.add_cost(loss, program.y[knots].ravel())

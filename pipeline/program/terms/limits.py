@@ -6,7 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 from pydrake.solvers import QuadraticConstraint
 
-from pipeline.program.program import Program
+from pipeline.program.program import Lifted, Program
 from pipeline.program.scaling import POSITION_SCALE
 
 
@@ -19,13 +19,18 @@ def give_way(program: Program) -> None:
     program.drake.AddLinearCost(np.ones(1), excess)
 
 
-def joints(program: Program) -> None:
-    """Position, velocity, torque and power, at every knot or over every interval."""
+def positions(program: Lifted) -> None:
+    """At every knot but a given start."""
     limits, first = program.limits, program.first_free
     if np.isfinite(limits.lower).any() or np.isfinite(limits.upper).any():
         knots = program.intervals + 1 - first
         low, high = (np.tile(POSITION_SCALE * bound, knots) for bound in (limits.lower, limits.upper))
         program.keep_within("position", low, high, program.y[first:].ravel(), (high - low) / 2)
+
+
+def joints(program: Program) -> None:
+    """Velocity, torque and power, over every interval."""
+    limits = program.limits
     if np.isfinite(limits.velocity).any():
         # Scaled so that a row's coefficients are of order one.
         to_velocity = program.scaling.to_velocity

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.common.arrays import Array
-from pipeline.program.program import Block, Lifted, blocks
+from pipeline.program.program import POSITIONS_PER_BINDING, Block, Lifted, blocks
 from pipeline.program.scaling import POSITION_SCALE
 from pipeline.program.terms import base
 
@@ -13,7 +13,7 @@ from pipeline.program.terms import base
 def follow(program: Lifted) -> None:
     """x(q_i) = x_ref,i, and for poses R(q_i) = R_ref,i; not at a start that is given, nor where closed joints do it."""
     end = program.intervals + (0 if program.closed and base.comes_back(program) else 1)
-    for knots in blocks(program.first_free, end):
+    for knots in blocks(program.first_free, end, POSITIONS_PER_BINDING):
         _at(program, np.setdiff1d(knots, program.left_out))
 
 
