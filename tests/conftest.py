@@ -24,6 +24,7 @@ from pipeline.path.reference import Reference
 from pipeline.path.timing import RaisedCosine
 from pipeline.problem.problem import Problem
 from pipeline.robot import urdf
+from pipeline.run.main import CONF
 from tests.once import made_once
 from tests.support import ROOT
 
@@ -42,7 +43,7 @@ def _files_of_conf_are_read_once() -> Iterator[None]:
 
     def load_once(repository: ConfigRepository, config_path: str) -> ConfigResult | None:
         places = [source.path for source in repository.get_sources()]
-        if not {*places} <= {"hydra.conf", str(ROOT / "conf"), ""}:
+        if not {*places} <= {"hydra.conf", "", str(ROOT / "conf"), CONF}:
             return load(repository, config_path)
         key = (config_path, *places)
         if key not in read:
@@ -172,6 +173,7 @@ def reproduce_in(folder: Path) -> None:
 
     few = (
         *(f"method.global.{key}" for key in ("configurations=12", "candidates=150", "optimised=12", "solver=newton")),
+        *(f"method.calculus_of_variations.{key}" for key in ("spacing=0.08", "tolerance=1e-8")),
         "identification.documents=[global]",
     )
     # Its law is one of large numbers.

@@ -31,6 +31,20 @@ RUN_FILES = {  # what every run leaves that has a confirmed motion
 }
 
 
+def dense(blocks: tuple[Array, ...], cyclic: bool) -> Array:
+    """(U s, U s) of blocks (U, s, s) on the diagonal and above it."""
+    count, size = blocks[0].shape[:2]
+    out = np.zeros((count, size, count, size))
+    for apart, band in enumerate(blocks):
+        assert len(band) == (count if cyclic else count - apart)
+        for k, block in enumerate(band):
+            other = (k + apart) % count
+            out[k, :, other] += block
+            if apart:
+                out[other, :, k] += block.T
+    return out.reshape(count * size, count * size)
+
+
 def differences(function: Callable[[Array], Array], x: Array, step: float = 1e-6) -> Array:
     """Central differences of function((k,)) -> (...): (..., k)."""
     columns = [(function(x + step * e) - function(x - step * e)) / (2 * step) for e in np.eye(len(x))]

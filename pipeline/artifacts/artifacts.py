@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from importlib import import_module
+from pathlib import Path
 
-from pipeline.artifacts.report import Artifact
+from pipeline.artifacts.report import Report
 
 # Modules of this package. The recording opens with a figure, and run.json comes last: it says that a run is finished.
 ARTIFACTS = ("summary", "figures.figures", "motion_files", "recording.recording", "record")
 
 
-def writer(artifact: str) -> Artifact:
-    """What writes it, loaded only now: figures and recordings bring the heaviest libraries of all."""
-    write: Artifact = import_module(f"{__package__}.{artifact}").write
-    return write
-
-
 def name(artifact: str) -> str:
     """What it is called, such as `figures`."""
     return artifact.partition(".")[0]
+
+
+def write(artifact: str, report: Report, folder: Path) -> None:
+    """Write it into `folder`. Its module is imported here: nobody waits for a plot library before the verdict."""
+    import_module(f"{__package__}.{artifact}").write(report, folder)

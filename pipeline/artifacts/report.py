@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, TypeVar
 
 from pipeline.evaluation.evaluation import Evaluation
@@ -38,6 +37,3 @@ class Report:
     def find(self, kind: type[Kind]) -> Kind | None:
         """The result of one study, or None where the run has none."""
         return next((result for result in self.results if isinstance(result, kind)), None)
-
-
-Artifact = Callable[[Report, Path], None]

@@ -122,11 +122,13 @@ def _base(problem: Problem, e: Evaluation) -> dict[str, Any]:
         of_held = [name for name, integral in INTEGRALS.items() if integral.base == "held"]
         names = of_held if problem.task.arm.base.count else []
         return row | {f"{name}_integral": e.integral(name) for name in names}
+    # As it is integrated from the joints; a method's own base states drift from that between its steps.
     floating = base.floating
+    turn, position = (base.turn, base.position) if floating is None else (floating.turn, floating.position)
     return {
-        "max_base_turn": base.turn.max(),
-        "final_base_turn": base.turn[-1],
-        "final_base_shift": float(np.linalg.norm(base.position[-1] - base.position[0])),
+        "max_base_turn": turn.max(),
+        "final_base_turn": turn[-1],
+        "final_base_shift": float(np.linalg.norm(position[-1] - position[0])),
         "base_rotation_integral": e.integral("base_rotation"),
         "linear_momentum_residual": np.nan if floating is None else floating.linear,
         "angular_momentum_residual": np.nan if floating is None else floating.angular,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,7 @@ from pipeline.path.curves import Geometry, Line, Still, circle, direction_vector
 from pipeline.path.orientation import Orientation
 from pipeline.path.reference import Reference
 from pipeline.path.through import SAME, TURN, Through, steps, through
-from pipeline.path.timing import ConstantSpeed, Quintic, RaisedCosine, Stamped, Timing, WithStops
+from pipeline.path.timing import ConstantSpeed, Cruise, Quintic, RaisedCosine, Stamped, Timing, WithStops
 from pipeline.path.waypoints import Waypoints, read, same_point
 
 NEGLIGIBLE = 1e-9  # of the length: a departure from the polygon below it is rounding
@@ -29,7 +30,13 @@ TIMINGS: dict[str, Callable[[float], Timing]] = {
     "raised_cosine": RaisedCosine,
     "constant_speed": ConstantSpeed,
     "quintic": Quintic,
+    "optimal": RaisedCosine,
 }
+
+
+def timing_law(timing: TimingConfig) -> Callable[[float], Timing]:
+    """What makes the law of a motion time [s]; where it is to be found, the one to begin with."""
+    return partial(Cruise, ramp=timing.ramp) if timing.law == "cruise" else TIMINGS[timing.law]
 
 
 def make_knots(timing: TimingConfig, duration: float) -> Array:
@@ -60,6 +67,10 @@ def make_task(robot: RobotConfig, arm: Arm) -> Task:
 
 def make_reference(path: Any, timing: TimingConfig, task: Task, q_init: Array) -> tuple[Reference, Array]:
     """The end effector's motion, and q_init moved onto its start if the path says where it starts."""
+    if timing.law == "from_file" and timing.duration == "shortest":
+        raise ConfigError("timing.duration = shortest: the times are those of path.file (timing.law = from_file)")
+    if timing.dense and timing.duration == "shortest":
+        raise ConfigError("timing.dense: its times [s] are of a motion time that is given, not of the shortest")
     count = len(task.axes)
     here = task.value(q_init[None])[0]
     given = path.orientation is not None or any(path.turn)
@@ -79,7 +90,7 @@ def make_reference(path: Any, timing: TimingConfig, task: Task, q_init: Array) -
                 f"timing.law = from_file: the times are those of a file; path.kind = {path.kind} has none"
             )
         geometry, orientation, notes = _curve(path, task, here[:count]), None, ()
-        law = TIMINGS[timing.law](timing.duration)
+        law = timing_law(timing)(timing.seconds)
     if orientation is None and not isinstance(task, PositionTask):
         orientation = _turning(path, geometry, here[count:])
     start = np.hstack([one.sample(np.zeros(1))[0] for one in (geometry, orientation) if one is not None])
@@ -148,19 +159,24 @@ def _read(path: WaypointsConfig, timing: TimingConfig, task: Task) -> Waypoints:
 
 def _law(path: WaypointsConfig, timing: TimingConfig, found: Through, times: Array | None) -> Timing:
     length = found.geometry.length
+    if timing.law == "optimal" and found.stops:
+        raise PathError(
+            f"timing.law = optimal: path.file = {path.file} comes to rest at way-point {found.stops[0] + 1}, which "
+            "a law that is found does not; choose timing=raised_cosine, quintic or cruise"
+        )
     if times is not None:
         return Stamped(tuple((times - times[0]).tolist()), tuple((found.marks / length).tolist()), found.stops)
-    law = TIMINGS[timing.law]
+    law = timing_law(timing)
     if not found.stops:
-        return law(timing.duration)
-    if not law(timing.duration).at_rest:
+        return law(timing.seconds)
+    if not law(timing.seconds).at_rest:
         raise PathError(
             f"path.file = {path.file}: the path turns back, or on the spot, at way-point {found.stops[0] + 1} while "
-            f"moving at {length / timing.duration:.3g} m/s (timing.law = {timing.law}); the laws raised_cosine and "
-            "quintic come to rest there"
+            f"moving at {length / timing.seconds:.3g} m/s (timing.law = {timing.law}); the laws raised_cosine, "
+            "quintic and cruise come to rest there"
         )
     between = [found.marks[i] / length for i in found.stops]
-    return WithStops(law, timing.duration, (0.0, *map(float, between), 1.0))
+    return WithStops(law, timing.seconds, (0.0, *map(float, between), 1.0))
 
 
 def _notes(path: WaypointsConfig, found: Through) -> tuple[str, ...]:

@@ -25,6 +25,8 @@ def prepare(config: RunConfig) -> Problem:
     reference, q_init = make_reference(config.path, config.timing, task, q_init)
     if config.timing.law == "from_file":
         refuse_endless(config, reference.duration, "path.file, which takes ")
+    free_law, free_duration = config.timing.law == "optimal", config.timing.duration == "shortest"
+    found = free_law or free_duration  # from rest to rest
     problem = Problem(
         task,
         reference,
@@ -34,8 +36,10 @@ def prepare(config: RunConfig) -> Problem:
         limits=make_limits(config.limits, arm),
         boundary=Boundary(config.boundary.kind),
         obstacles=make_obstacles(config.obstacles, arm),
-        rest=("start" in config.boundary.rest, "end" in config.boundary.rest),
+        rest=(found or "start" in config.boundary.rest, found or "end" in config.boundary.rest),
         zero_acceleration=config.boundary.zero_acceleration,
+        free_law=free_law,
+        free_duration=free_duration,
     )
     check_problem(problem)
     if config.base.kind == "fixed":

@@ -9,6 +9,9 @@ from pipeline.common.errors import ConfigError
 from pipeline.model.kinematics import project
 from pipeline.problem.problem import Boundary, Problem
 
+PACE = ("velocity", "acceleration", "jerk", "torque", "power")
+
+
 SHARE = 0.05  # of the motion time, in which the suggested acceleration reaches the motion's largest joint speed
 
 
@@ -17,8 +20,8 @@ def check_rest(problem: Problem) -> None:
     bounds, cyclic = problem.bounds, problem.boundary is Boundary.CYCLIC
     if any(problem.rest) and not problem.reference.timing.at_rest:
         raise ConfigError(
-            "boundary.rest: the path is entered and left at speed; choose a law that rests there (timing=raised_cosine "
-            "or quintic)"
+            "boundary.rest: the path is entered and left at speed; choose a law that rests there "
+            "(timing=raised_cosine, quintic or cruise)"
         )
     if problem.zero_acceleration and not any(problem.rest):
         raise ConfigError("boundary.zero_acceleration: of which ends is said by boundary.rest=[start,end]")
@@ -28,14 +31,26 @@ def check_rest(problem: Problem) -> None:
             "limits.jerk: a motion that begins or ends with an acceleration has a jerk without bound there; set "
             "boundary.rest=[start,end] and boundary.zero_acceleration=true"
         )
-    limited = np.isfinite(bounds.acceleration) | np.isfinite(bounds.jerk)
-    given = problem.boundary is Boundary.FIXED and problem.rest[0]
-    if given and not problem.objective.second_order and not np.all(limited):
+    if problem.free_duration:
+        if not any(np.isfinite(getattr(bounds, kind)).any() for kind in PACE):
+            raise ConfigError(
+                "timing.duration = shortest: nothing limits the motion's pace; set limits.velocity, "
+                "limits.acceleration or limits.torque"
+            )
+        return
+    if problem.rest[0] and unlimited_start(problem):
         raise ConfigError(
             "boundary.rest: with a given start and an objective of velocities there is no best motion from rest "
             "unless the accelerations of all joints are limited: it would jump to its speed within one step, however "
             f"short; set limits.acceleration, such as {suggested(problem):g} rad/s^2"
         )
+
+
+def unlimited_start(problem: Problem) -> bool:
+    """Whether there is no best motion from rest: see what `check_rest` says of it."""
+    bounds = problem.bounds
+    limited = np.isfinite(bounds.acceleration) | np.isfinite(bounds.jerk)
+    return problem.boundary is Boundary.FIXED and not problem.objective.second_order and not bool(np.all(limited))
 
 
 def suggested(problem: Problem) -> float:

@@ -14,11 +14,13 @@ from pipeline.common.files import shipped
 from pipeline.config.as_written import keep_as_written
 from pipeline.config.methods import METHODS
 from pipeline.config.run import RunConfig, check
+from pipeline.config.unfolding import bound_files, bounded
 
 
 def experiment(name: str, *overrides: str) -> RunConfig:
     """The checked configuration of `+experiment=name`; raises ConfigError, one line."""
     keep_as_written()
+    bound_files()
     words = [f"+experiment={name}", *overrides]
     if GlobalHydra.instance().is_initialized():
         return checked(compose("config", overrides=words))
@@ -30,7 +32,8 @@ def checked(values: DictConfig) -> RunConfig:
     """The typed configuration of a composed one; raises ConfigError."""
     own = OmegaConf.masked_copy(values, [str(key) for key in values if key != "hydra"])
     try:
-        plain = OmegaConf.to_container(own, resolve=True, throw_on_missing=False)
+        with bounded(together=True):
+            plain = OmegaConf.to_container(own, resolve=True, throw_on_missing=False)
     except OmegaConfBaseException as error:
         raise ConfigError(f"{error.full_key}: {str(error.msg).splitlines()[0]}") from None
     assert isinstance(plain, dict)

@@ -13,6 +13,7 @@ Integral = Literal["kinetic_energy", "torque", "velocity_norm", "base_rotation",
 INTEGRALS: tuple[str, ...] = get_args(Integral)
 
 Positive = Annotated[Number, Field(gt=0)]
+Bound = Annotated[Number, Field(ge=1e-9)]  # robot.limits.STILL: nothing moves below it
 Weight = Annotated[Number, Field(ge=0)]
 Share = Annotated[Number, Field(ge=0, le=1)]
 
@@ -110,23 +111,23 @@ class LimitsConfig:
     ] = "none"
     lower: Annotated[OneOrList[Number] | None, Field(description="[rad] least joint position, one or per joint")] = None
     upper: Annotated[OneOrList[Number] | None, Field(description="[rad] largest joint position, the same way")] = None
-    velocity: Annotated[OneOrList[Positive] | None, Field(description="[rad/s] largest joint speed")] = None
-    torque: Annotated[OneOrList[Positive] | None, Field(description="[N m] largest joint torque")] = None
+    velocity: Annotated[OneOrList[Bound] | None, Field(description="[rad/s] largest joint speed")] = None
+    torque: Annotated[OneOrList[Bound] | None, Field(description="[N m] largest joint torque")] = None
     power: Annotated[
-        OneOrList[Positive] | None, Field(description="[W] largest |torque x velocity|; no robot description has it")
+        OneOrList[Bound] | None, Field(description="[W] largest |torque x velocity|; no robot description has it")
     ] = None
     acceleration: Annotated[
-        OneOrList[Positive] | None, Field(description="[rad/s^2] largest joint acceleration, between the knots too")
+        OneOrList[Bound] | None, Field(description="[rad/s^2] largest joint acceleration, between the knots too")
     ] = None
     jerk: Annotated[
-        OneOrList[Positive] | None, Field(description="[rad/s^3] largest joint jerk; needs boundary.zero_acceleration")
+        OneOrList[Bound] | None, Field(description="[rad/s^3] largest joint jerk; needs boundary.zero_acceleration")
     ] = None
     file: Annotated[
         Text | None,
         Field(description="YAML file of ROS 2, joint_limits.yaml: what it states holds, a value given here overrides"),
     ] = None
     attitude: Annotated[
-        Annotated[Number, Field(gt=0, le=1.5)] | None,
+        Annotated[Number, Field(ge=1e-9, le=1.5)] | None,
         Field(description="[rad] by how much a floating base may turn from its start, at any time"),
     ] = None
 

@@ -6,7 +6,18 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field
 
-from pipeline.config.fields import Coordinates, Number, Numbers, OneOrList, Switch, Text, Vector, Whole, schema
+from pipeline.config.fields import (
+    Coordinates,
+    Number,
+    Numbers,
+    OneOrList,
+    Switch,
+    Text,
+    Vector,
+    Whole,
+    WordOrPositive,
+    schema,
+)
 
 Direction = OneOrList[Number]
 START = "[m] task coordinates of the start; null: the end effector at robot.q_init"
@@ -90,12 +101,26 @@ class TimingConfig:
     """Group `timing`: the law s(t), the motion time and the number of intervals of the global grid."""
 
     law: Annotated[
-        Literal["raised_cosine", "constant_speed", "quintic", "from_file"],
-        Field(description="how the path is run through in time; from_file: by the column time of path.file"),
+        Literal["raised_cosine", "constant_speed", "quintic", "cruise", "optimal", "from_file"],
+        Field(
+            description="how the path is run through in time; optimal: as costs least, found with the motion; "
+            "from_file: by the column time of path.file"
+        ),
     ] = "raised_cosine"
-    duration: Annotated[Number, Field(gt=0, description="[s] motion time, unless it is from_file")] = 10.0
+    duration: Annotated[
+        WordOrPositive[Literal["shortest"]],
+        Field(description="[s] motion time, unless it is from_file; shortest: as short as the limits allow"),
+    ] = 10.0
+    ramp: Annotated[
+        Number, Field(ge=1e-3, le=0.5, description="of law cruise: the share of the motion time for each of its ends")
+    ] = 0.4
     steps: Annotated[Whole, Field(ge=2, le=100_000, description="intervals of the grid of the planner's optima")] = 100
     dense: Annotated[
         tuple[Annotated[Numbers, AfterValidator(_finer)], ...],
         Field(description="rows [from s, to s, factor]: where that grid is finer than elsewhere"),
     ] = ()
+
+    @property
+    def seconds(self) -> float:
+        """The motion time [s], or one to begin with where the shortest is to be found."""
+        return 1.0 if isinstance(self.duration, str) else self.duration

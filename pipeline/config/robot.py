@@ -13,6 +13,7 @@ Position = Annotated[Number, Field(ge=-1e4, le=1e4)]  # [rad or m] of a joint: a
 Positions = tuple[Position, ...]
 Positive = Annotated[Number, Field(gt=0)]
 Edges = Annotated[tuple[Positive, ...], Field(min_length=3, max_length=3)]
+Momentum = Annotated[tuple[Annotated[Number, Field(ge=-1e6, le=1e6)], ...], Field(min_length=3, max_length=3)]
 ORIGIN = (0.0, 0.0, 0.0)
 
 
@@ -120,10 +121,10 @@ class FreeBaseConfig:
         OneOrList[Number],
         Field(description="[kg m^2] about com in the root link's frame: one, [ixx, iyy, izz], or [..., ixy, ixz, iyz]"),
     ] = 0.0
-    com: Annotated[Vector, Field(description="[m] centre of mass of the spacecraft in that frame")] = ORIGIN
-    linear_momentum: Annotated[Vector, Field(description="[N s] of the whole system, in the world")] = ORIGIN
+    com: Annotated[Pose, Field(description="[m] centre of mass of the spacecraft in that frame")] = ORIGIN
+    linear_momentum: Annotated[Momentum, Field(description="[N s] of the whole system, in the world")] = ORIGIN
     angular_momentum: Annotated[
-        Vector, Field(description="[N m s] of it, about the place where the root link starts")
+        Momentum, Field(description="[N m s] of it, about the place where the root link starts")
     ] = ORIGIN
 
 

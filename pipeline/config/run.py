@@ -16,7 +16,13 @@ from pipeline.config.methods import MethodConfig, MethodName
 from pipeline.config.path import CircleConfig, LineConfig, TimingConfig, WaypointsConfig
 from pipeline.config.robot import FixedBaseConfig, FreeBaseConfig, ObstaclesConfig, RobotConfig
 from pipeline.config.steps import refuse_endless, refuse_endless_roadmap
-from pipeline.config.studies import CandidateStudyConfig, ClosedLoopConfig, ExportConfig, IdentificationConfig
+from pipeline.config.studies import (
+    CandidateStudyConfig,
+    ClosedLoopConfig,
+    ExportConfig,
+    IdentificationConfig,
+    RetimingConfig,
+)
 
 
 @schema
@@ -70,6 +76,7 @@ class RunConfig:
     sweep: SweepConfig = SweepConfig()
     candidate_study: CandidateStudyConfig = CandidateStudyConfig()
     export: ExportConfig = ExportConfig()
+    retiming: RetimingConfig = RetimingConfig()
     closed_loop: ClosedLoopConfig = ClosedLoopConfig()
     identification: IdentificationConfig = IdentificationConfig()
 
@@ -78,6 +85,6 @@ def check(values: Mapping[str, Any]) -> RunConfig:
     """The checked configuration of one run; raises ConfigError naming the key and what is allowed."""
     config = build(RunConfig, values)
     refuse_endless_roadmap(config)
-    if config.timing.law != "from_file":
+    if config.timing.law != "from_file" and isinstance(config.timing.duration, float):
         refuse_endless(config, config.timing.duration)
     return config

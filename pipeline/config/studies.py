@@ -36,6 +36,13 @@ class ExportConfig:
 
 
 @schema
+class RetimingConfig:
+    """The least time for the joint path of every motion, by toppra: a lower bound, with jerks that have none."""
+
+    run: Annotated[Switch, Field(description="whether it is computed")] = False
+
+
+@schema
 class IdentificationConfig:
     """The masses of the links from the numbers that documents print, see experiment identify_masses."""
 

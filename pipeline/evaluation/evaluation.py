@@ -116,6 +116,7 @@ class Evaluation:
 
 def evaluate(problem: Problem, solution: Solution) -> Evaluation:
     """Recompute everything about `solution`; a motion that breaks its method's promise gets the status UNCONFIRMED."""
+    problem = solution.posed(problem)
     arm, task, trajectory = problem.task.arm, problem.task, solution.trajectory
     time, q = trajectory.time, trajectory.q
     dt = np.diff(time)

@@ -44,6 +44,11 @@ class FreeMotion:
     angular: float
     path_error: float
 
+    @property
+    def turn(self) -> Array:
+        """The angle (S,) [rad] by which the root link has turned from its start."""
+        return np.asarray((self.rotation * self.rotation[0].inv()).magnitude())
+
 
 class BasePlant:
     """The arm and its spacecraft as one free body with joints; velocities: [w, v of the root link's origin, qd_m]."""

@@ -16,7 +16,7 @@ from pipeline.common.arrays import Array
 from pipeline.config.methods import LsvOptions
 from pipeline.methods.correction import diverges
 from pipeline.methods.method import ANY, Context, Method
-from pipeline.methods.singularity import SingularityWatch
+from pipeline.methods.singularity import SingularityWatch, lost
 from pipeline.model.kinematics import least_velocity
 from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Solution, Trajectory
@@ -70,6 +70,10 @@ def _integrate(method: str, problem: Problem, options: LsvOptions, *, weighted: 
         slope = velocity(i, q[i], jacobian[0], correction)
         if options.integrator == "heun":
             ahead = q[i] + dt * slope
+            if lost(ahead):
+                return watch.lost(method, time, problem.q_init, i + 1)
             slope = (slope + velocity(i + 1, ahead, task.jacobian(ahead[None])[0], correction)) / 2
         q[i + 1] = q[i] + dt * slope
+        if lost(q[i + 1]):
+            return watch.lost(method, time, problem.q_init, i + 1)
     return watch.judge(method, Trajectory(time, q), {"steps": steps, "integrator": options.integrator})

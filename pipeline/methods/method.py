@@ -24,7 +24,7 @@ class Serves:
     positions and velocities, 2 for one of accelerations too (torques, reactions). constraints: whether there may be
     limits or obstacles. orientation: whether the task may prescribe one. moving_base: whether the arm may stand on a
     base that floats, or that is held so that what it feels can count. rest: whether the joints may be
-    told to rest at an end, or their accelerations and jerks be limited.
+    told to rest at an end, or their accelerations and jerks be limited. timing: whether the timing may be left to it.
     """
 
     redundancy: int | None = None
@@ -34,10 +34,13 @@ class Serves:
     orientation: bool = True
     moving_base: bool = True
     rest: bool = True
+    timing: bool = False
 
     def why_not(self, problem: Problem) -> str | None:
         """The first condition that `problem` does not meet and what is supported, without full stop; None if served."""
         why = self._unmet(problem)
+        if why is None and not self.timing and problem.free_timing:
+            return "timing.law = optimal and timing.duration = shortest are found by the method global alone"
         return _contradiction(problem) if why is None else f"{why}; supported {self}"
 
     def _unmet(self, problem: Problem) -> str | None:
@@ -92,6 +95,7 @@ def _contradiction(problem: Problem) -> str | None:
 
 
 ANY = Serves()
+WITH_TIMING = Serves(timing=True)
 ON_KNOTS = Serves(rest=False)  # by differences, which know no rest
 
 

@@ -1,4 +1,4 @@
-"""When does a motion count as singular? Watched at every step of the integrating methods."""
+"""When does a motion count as singular, or as lost? Watched at every step of the integrating methods."""
 
 from __future__ import annotations
 
@@ -8,6 +8,13 @@ import numpy as np
 
 from pipeline.common.arrays import Array
 from pipeline.problem.solution import Solution, Status, Trajectory
+
+LOST = 1e6  # [rad or m]: no joint is there, and a sine is hardly known
+
+
+def lost(q: Array) -> bool:
+    """Whether an integration has left all bounds: what follows is not finite."""
+    return not bool(np.abs(q).max() <= LOST)
 
 
 def singular_value_ratio(jacobian: Array) -> Array:
@@ -29,6 +36,15 @@ class SingularityWatch:
             self.first = min(self.first, float(time))
         if ratio < self.smallest:
             self.time, self.smallest = float(time), ratio
+
+    def lost(self, method: str, time: Array, q_init: Array, step: int) -> Solution:
+        """None found, since the integration left all bounds at a step: the arm is held at its start (n,)."""
+        message = (
+            f"diverged at t = {time[step]:.3g} s, where the joints are beyond {LOST:g} rad; smallest singular value "
+            f"{self.smallest:.1e} of the largest, at t = {self.time:.3g} s"
+        )
+        held = Trajectory(time, np.repeat(q_init[None], len(time), axis=0))
+        return Solution(method, held, Status.INFEASIBLE, message, found=False, grid=f"method.{method}.dt")
 
     def judge(self, method: str, trajectory: Trajectory, statistics: dict[str, Any]) -> Solution:
         singular = self.smallest < self.threshold

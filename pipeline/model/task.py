@@ -66,6 +66,10 @@ class PositionTask:
         x, jacobian = self.arm.position_and_jacobian(q)
         return x[:, self.rows] - target, jacobian[:, self.rows]
 
+    def error_by_target(self, q: Array, target: Array, rate: Array) -> Array:
+        """The derivative (K, m) of the error by a parameter of the target, of which `rate` (K, m) is the target's."""
+        return -rate
+
     def jacobian_and_gradient(self, q: Array) -> tuple[Array, Array]:
         """J (K, m, n) and d J_ij / d q_k (K, m, n, n) [m/rad^2] from one pass."""
         jacobian, gradient = self.arm.jacobian_and_gradient(q)
@@ -151,6 +155,14 @@ class PoseTask:
         turn, by_angular = self.turn(rotation, target)
         angular = by_angular @ rotation.swapaxes(1, 2) @ both[:, :3]
         return np.hstack([position - target[:, :3], turn]), np.concatenate([both[:, 3:], angular], axis=1)
+
+    def error_by_target(self, q: Array, target: Array, rate: Array) -> Array:
+        """The derivative (K, m) of the error by a parameter of the target, of which `rate` (K, 6) is the target's, its
+        turning in the world: as if the end effector turned the other way.
+        """
+        rotation = self.arm.pose(q)[1]
+        own = np.einsum("kji,kj->ki", rotation, -rate[:, 3:])
+        return np.hstack([-rate[:, :3], np.einsum("kai,ki->ka", self.turn(rotation, target)[1], own)])
 
     def jacobian_and_gradient(self, q: Array) -> tuple[Array, Array]:
         """J (K, m, n), d J_ij / d q_k (K, m, n, n): later joints turn a joint's angular velocity in this frame."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -34,11 +34,20 @@ class Reference:
     def sample(self, t: Array) -> tuple[Array, Array, Array]:
         """Targets, their velocities and accelerations at times t (K,): each (K, m), or (K, 6) for poses (task.py)."""
         s, sd, sdd = self.timing.sample(np.asarray(t, dtype=float), self.geometry.length)
+        x, tangent, curvature = self.along(s)
+        return x, tangent * sd[:, None], curvature * sd[:, None] ** 2 + tangent * sdd[:, None]
+
+    def along(self, s: Array) -> tuple[Array, Array, Array]:
+        """Targets at the arc lengths s (K,) [m], and their first and second derivatives by it, in the same shapes."""
         x, tangent, curvature = self.geometry.sample(s)
         if self.orientation is not None:
             turned = self.orientation.sample(s)
             x, tangent, curvature = (np.hstack(pair) for pair in zip((x, tangent, curvature), turned, strict=True))
-        return x, tangent * sd[:, None], curvature * sd[:, None] ** 2 + tangent * sdd[:, None]
+        return x, tangent, curvature
+
+    def slowed(self, by: float) -> Reference:
+        """The same path in `by` times the time."""
+        return replace(self, timing=self.timing.slowed(by))
 
     def position(self, t: Array) -> Array:
         return self.sample(t)[0]

@@ -1,16 +1,18 @@
-"""Timing laws s(t): raised cosine, constant speed, quintic; such a law with stops on the way; and time stamps."""
+"""Timing laws s(t): raised cosine, constant speed, quintic, cruise; such laws with stops on the way; time stamps."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 import numpy as np
-from scipy.interpolate import BPoly
+from scipy.interpolate import BPoly, CubicSpline
 
 from pipeline.common.arrays import Array
+
+Scaled = TypeVar("Scaled", bound="Timing")
 
 
 class Timing(Protocol):
@@ -27,9 +29,20 @@ class Timing(Protocol):
     def sample(self, t: Array, length: float) -> tuple[Array, Array, Array]:
         """s [m], sd [m/s] and sdd [m/s^2] at t (K,)."""
 
+    def slowed(self, by: float) -> Timing:
+        """The same law in `by` times the time."""
+
+
+class Scalable:
+    """A law that its duration says all of."""
+
+    def slowed(self: Scaled, by: float) -> Scaled:
+        """The same law in `by` times the time."""
+        return replace(self, duration=self.duration * by)  # type: ignore[type-var]
+
 
 @dataclass(frozen=True)
-class RaisedCosine:
+class RaisedCosine(Scalable):
     """The papers' law: acceleration (4 L / T^2)(1 - cos(4 pi t / T)), mirrored in the second half; jerk is continuous.
 
     PMKE paper eq. (5) and Global paper eqs (19), (23), which print s(t) under the label ds/dt.
@@ -50,7 +63,7 @@ class RaisedCosine:
 
 
 @dataclass(frozen=True)
-class ConstantSpeed:
+class ConstantSpeed(Scalable):
     """s = L t / T: the path is entered and left at speed."""
 
     duration: float
@@ -62,7 +75,7 @@ class ConstantSpeed:
 
 
 @dataclass(frozen=True)
-class Quintic:
+class Quintic(Scalable):
     """Rest to rest with zero acceleration at both ends: s = L (10 u^3 - 15 u^4 + 6 u^5), u = t / T."""
 
     duration: float
@@ -77,7 +90,32 @@ class Quintic:
 
 
 @dataclass(frozen=True)
-class WithStops:
+class Cruise(Scalable):
+    """Up to speed in a share `ramp` of the motion time, as much of it down again, and constant speed in between.
+
+    T_a = ramp T, v = L / (T - T_a), acceleration (v / T_a)(1 - cos(2 pi t / T_a)), mirrored: with ramp = 1/2 the law of
+    the papers.
+    """
+
+    duration: float
+    ramp: float = 0.4
+    at_rest: bool = True
+
+    def sample(self, t: Array, length: float) -> tuple[Array, Array, Array]:
+        total, rise = self.duration, self.ramp * self.duration
+        speed, omega = length / (total - rise), 2 * np.pi / rise
+        late = t > total / 2
+        u = np.where(late, total - t, t)
+        up = u < rise
+        w = np.where(up, u, rise)
+        s = speed / rise * (w**2 / 2 + (np.cos(omega * w) - 1) / omega**2) + speed * (u - w)
+        sd = speed / rise * (w - np.sin(omega * w) / omega)
+        sdd = np.where(up, speed / rise * (1 - np.cos(omega * w)), 0.0)
+        return np.where(late, length - s, s), sd, np.where(late, -sdd, sdd)
+
+
+@dataclass(frozen=True)
+class WithStops(Scalable):
     """A law from rest to rest between each stop and the next: the time is shared out by length, so that the same speed
     is reached in all parts. stops: fractions of the length, increasing, from 0 to 1.
     """
@@ -130,3 +168,33 @@ class Stamped:
 
     def sample(self, t: Array, length: float) -> tuple[Array, Array, Array]:
         return length * self._law(t), length * self._law(t, 1), length * self._law(t, 2)
+
+    def slowed(self, by: float) -> Stamped:
+        """The same law in `by` times the time."""
+        return replace(self, times=tuple(by * time for time in self.times))
+
+
+@dataclass(frozen=True)
+class Found:
+    """A law that was optimised: the C2 cubic spline, at rest at both ends, through fractions (N + 1,) of the length at
+    times (N + 1,) [s], from 0 on.
+    """
+
+    times: tuple[float, ...]
+    fractions: tuple[float, ...]
+    at_rest: bool = True
+
+    @property
+    def duration(self) -> float:
+        return self.times[-1]
+
+    @cached_property
+    def _law(self) -> CubicSpline:
+        return CubicSpline(self.times, self.fractions, bc_type="clamped")
+
+    def sample(self, t: Array, length: float) -> tuple[Array, Array, Array]:
+        return length * self._law(t), length * self._law(t, 1), length * self._law(t, 2)
+
+    def slowed(self, by: float) -> Found:
+        """The same law in `by` times the time."""
+        return replace(self, times=tuple(by * time for time in self.times))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -37,6 +37,8 @@ class Problem:
     bounds_of_integrals: upper bounds by the names in the catalogue (`integrals.py`), positive; an infinite one is none.
     qd_init: (n,) [rad/s] the velocity that a motion from q_init comes with; None: at rest, or as the path is entered.
     rest: whether all joints rest at the start, at the end. zero_acceleration: whether they do not accelerate there.
+    free_law: whether the law of the path is to be found, in the time of the one given; free_duration: whether the
+    motion is to be as short as its limits allow. `reference` and `times` are then where the search begins.
     """
 
     task: Task
@@ -51,6 +53,8 @@ class Problem:
     qd_init: Array | None = None
     rest: tuple[bool, bool] = (False, False)
     zero_acceleration: bool = False
+    free_law: bool = False
+    free_duration: bool = False
 
     def __post_init__(self) -> None:
         for name, bound in self.bounds_of_integrals.items():
@@ -62,6 +66,15 @@ class Problem:
     @property
     def bounds(self) -> Limits:
         return self.limits if self.limits is not None else Limits.none(self.task.arm.n)
+
+    @property
+    def free_timing(self) -> bool:
+        """Whether the law of the path or its duration is to be found."""
+        return self.free_law or self.free_duration
+
+    def slowed(self, by: float) -> Problem:
+        """The same problem in `by` times the time."""
+        return replace(self, reference=self.reference.slowed(by), times=self.times * by)
 
     @property
     def gap(self) -> tuple[float, float]:

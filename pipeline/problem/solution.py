@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from pipeline.common.arrays import Array
+from pipeline.path.reference import Reference
+from pipeline.problem.problem import Problem
 
 Progress = Callable[[int, int, float], None]  # (done, all, best cost so far)
 
@@ -53,6 +55,7 @@ class Solution:
     `knots_only`: it goes from node to node of a grid, and promises nothing of the path between its knots.
     `grid` is the key of the configuration that its knots come from.
     `evidence`: what speaks for the motion, in words: how it was found and what confirms it.
+    `reference`: the path with the law that was found for it; None: it is the problem's.
     `found` is False where there is no motion to speak of: the trajectory then only holds the arm at its start.
     """
 
@@ -69,7 +72,15 @@ class Solution:
     knots_only: bool = False
     grid: str = "timing.steps"
     evidence: str = ""
+    reference: Reference | None = None
     statistics: dict[str, Any] = field(default_factory=dict)
+
+    def posed(self, problem: Problem) -> Problem:
+        """The problem with the law that was found for it, on its own knots."""
+        if self.reference is None:
+            return problem
+        found = replace(problem, reference=self.reference, times=self.trajectory.time)
+        return replace(found, free_law=False, free_duration=False)
 
     def to_frame(self) -> pd.DataFrame:
         """The motion as a table of N + 1 rows: time [s], all coordinates q_1..n [rad or m], a moving base's first."""

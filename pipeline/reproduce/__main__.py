@@ -30,6 +30,9 @@ FOLDER = Path("outputs") / "reproduction"
 
 def main(words: Sequence[str]) -> int:
     """The sweep, then its tables and pages; returns the exit code."""
+    if {"--help", "-h"} & {*words}:
+        print(__doc__)
+        return 0
     try:
         names, folder, overrides = parse(words)
         asked = [documents.read(name) for name in names]

@@ -19,7 +19,7 @@ from pipeline.reproduce.recompute import Runs
 from pipeline.reproduce.results import ResultError
 from pipeline.reproduce.table import counts
 from pipeline.reproduce.tables import HEAD, TIMES, cells, sentence
-from pipeline.reproduce.verdict import TIMING
+from pipeline.reproduce.verdict import NOT_RUN, TIMING
 
 DPI = 90
 INDEX = "reproduction.html"
@@ -34,7 +34,7 @@ td.note { color: #5a6472 } code { font-size: .85em }
 img { max-width: 100%; display: block; margin: .8rem 0 }
 .verdict { border-radius: .6rem; padding: .05rem .55rem; white-space: nowrap }
 .reproduced { background: #d8f0df } .better { background: #d7e7fa } .misprint { background: #fbeecb }
-.differs { background: #fadbd8 } .timing { background: #edf2f7 }
+.differs { background: #fadbd8 } .timing, .not { background: #edf2f7 }
 """
 
 
@@ -51,18 +51,20 @@ def write(folder: Path, documents: Sequence[Document], table: pd.DataFrame, runs
 
 def index(documents: Sequence[Document], table: pd.DataFrame) -> str:
     """How many of each verdict per document, and what differs, with the reason."""
-    head = ["document", *counts(table), "in all"]
+    verdicts = counts(table)
+    head = ["document", *verdicts, "in all"]
     rows = []
     for document in documents:
         own = table[table["document"] == document.name]
         link = f'<a href="{document.name}.html">{escape(document.title)}</a><br>{escape(document.source)}'
-        rows.append([link, *map(str, counts(own).values()), str(sum(counts(own).values()))])
-    rows.append(["all", *map(str, counts(table).values()), str(sum(counts(table).values()))])
+        rows.append([link, *(str(counts(own).get(name, 0)) for name in verdicts), str(sum(counts(own).values()))])
+    rows.append(["all", *map(str, verdicts.values()), str(sum(verdicts.values()))])
     body = f"<h1>Printed and recomputed</h1><p>{escape(sentence(table))}.</p>{_table(head, rows)}"
     kinds = (
         ("differs", "What differs, and why"),
         ("misprint", "Misprints"),
         ("better", "Better"),
+        (NOT_RUN, "Not run yet"),
         (TIMING, TIMES),
     )
     for verdict, title in kinds:

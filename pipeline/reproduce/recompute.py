@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from pipeline.config import found as kinds
-from pipeline.reproduce.results import ResultError, Results
+from pipeline.reproduce.results import NotRunError, ResultError, Results
 
 AT_LIMIT = 1e-5  # relative: a value this near to its limit is at it
 
@@ -18,10 +18,10 @@ Runs = Mapping[str, Results]
 
 
 def recompute(found: Any, runs: Runs) -> float:
-    """The number that `found` describes; raises ResultError if the runs do not hold it."""
+    """The number that `found` describes; raises NotRunError without its run, ResultError if it is not in it."""
     for name in found.experiments:
         if name not in runs:
-            raise ResultError(f"no run of experiment {name}")
+            raise NotRunError(f"no run of experiment {name}")
     return float(_value(found, runs))
 
 

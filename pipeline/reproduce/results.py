@@ -24,6 +24,10 @@ class ResultError(InputError):
     """A run does not hold what is looked for in it."""
 
 
+class NotRunError(ResultError):
+    """There is no such run."""
+
+
 @dataclass(frozen=True)
 class Results:
     """One run's folder; each file is read when it is first needed."""

@@ -9,8 +9,8 @@ import pandas as pd
 
 from pipeline.config.documents import Document, Row
 from pipeline.reproduce.recompute import Runs, recompute
-from pipeline.reproduce.results import ResultError
-from pipeline.reproduce.verdict import TIMING, VERDICTS, verdict
+from pipeline.reproduce.results import NotRunError, ResultError
+from pipeline.reproduce.verdict import NOT_RUN, TIMING, VERDICTS, verdict
 
 COLUMNS = (
     "document",
@@ -42,7 +42,7 @@ def command(row: Row) -> str:
 
 
 def compare(documents: Sequence[Document], runs: Runs) -> pd.DataFrame:
-    """All rows of the documents, in their order; a number that no run holds is one that differs, with the reason."""
+    """All rows of the documents, in their order; a number that its run does not hold differs, with the reason."""
     masses = _with_printed_masses(runs)
     rows = []
     for document in documents:
@@ -50,8 +50,10 @@ def compare(documents: Sequence[Document], runs: Runs) -> pd.DataFrame:
             note = row.note
             try:
                 value = recompute(row.found, runs)
+                word = judge(row, value)
             except ResultError as error:
                 value, note = float("nan"), str(error)
+                word = NOT_RUN if isinstance(error, NotRunError) else judge(row, value)
             rows.append(
                 {
                     "document": document.name,
@@ -61,7 +63,7 @@ def compare(documents: Sequence[Document], runs: Runs) -> pd.DataFrame:
                     "unit": row.unit,
                     "recomputed": value,
                     "relative_difference": _difference(row, value),
-                    "verdict": judge(row, value),
+                    "verdict": word,
                     "with_printed_masses": masses.get((document.name, place.place, row.quantity), np.nan),
                     "note": "; ".join(part for part in (_read_as(row), note, row.why) if part),
                     "command": command(row),
@@ -71,8 +73,9 @@ def compare(documents: Sequence[Document], runs: Runs) -> pd.DataFrame:
 
 
 def counts(table: pd.DataFrame) -> dict[str, int]:
-    """How many rows have each verdict; computing times have none."""
-    return {name: int((table["verdict"] == name).sum()) for name in VERDICTS}
+    """How many rows have each verdict, and how many wait for their run, if any do; computing times have none."""
+    found = {name: int((table["verdict"] == name).sum()) for name in (*VERDICTS, NOT_RUN)}
+    return {name: count for name, count in found.items() if count or name in VERDICTS}
 
 
 def _read_as(row: Row) -> str:

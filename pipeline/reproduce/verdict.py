@@ -7,6 +7,7 @@ import math
 from pipeline.config.documents import half_width
 
 REPRODUCED, BETTER, MISPRINT, DIFFERS = VERDICTS = ("reproduced", "better", "misprint", "differs")
+NOT_RUN = "not run"  # in place of a verdict: nobody has computed the number yet
 TIMING = "timing"  # in place of a verdict: what a machine of today computes in says nothing of a document
 _EDGE = 1 + 1e-9  # a value on the edge of the rounding still rounds to what is printed
 

@@ -20,6 +20,7 @@ import yaml
 
 from pipeline.common.arrays import Array
 from pipeline.common.errors import RobotError
+from pipeline.robot.limits import STILL
 
 # Of each key of `problem.limits.Limits`: the key of the file, and the switch that says whether it holds.
 KEYS = {
@@ -68,8 +69,8 @@ def _load(file: Path) -> dict[Any, Any]:
 
 def _number(file: Path, joint: str, name: str, value: Any) -> float:
     numeric = isinstance(value, int | float) and not isinstance(value, bool) and np.isfinite(value)
-    if not numeric or (not name.endswith("position") and value <= 0):
-        needed = "a number" if name.endswith("position") else "a number above 0"
+    if not numeric or (not name.endswith("position") and value < STILL):
+        needed = "a number" if name.endswith("position") else f"one of at least {STILL:g}"
         said = "is missing" if value is None else f"= {value}"
         raise RobotError(f"limits.file = {file}: {name} of {joint} {said}; {needed} is needed")
     return float(value)

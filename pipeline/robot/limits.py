@@ -13,6 +13,7 @@ from pipeline.robot.numbers import number, shown
 from pipeline.robot.tree import Joint, Tree
 
 UNLIMITED = 1e6  # [rad, m, rad/s, N m, ...]: from here on a number says that there is no limit; SDF writes 1e16
+STILL = 1e-9  # [rad/s, N m, ...]: below it nothing moves, and solvers that divide by a bound do not live through it
 ABSENT = {"lower": -np.inf, "upper": np.inf, "velocity": np.inf, "effort": np.inf}
 OVERRIDE = {"velocity": "limits.velocity", "effort": "limits.torque"}
 
@@ -32,22 +33,22 @@ def bound(tree: Tree, joint: Joint, key: str) -> float:
 
 
 def bounds(tree: Tree, joints: list[Joint], key: str, unlimited: Collection[str] = ()) -> Array:
-    """One bound of each joint (n,). unlimited: for which of velocity and effort nothing above zero means no limit."""
+    """One bound of each joint (n,). unlimited: for which of velocity and effort next to nothing means no limit."""
     values = np.array([bound(tree, joint, key) for joint in joints])
     if key in unlimited:
-        empty = values <= 0.0
+        empty = values < STILL
         if empty.any():
             names = ", ".join(joint.name for joint, none in zip(joints, empty, strict=True) if none)
             tree.notes.append(
-                f"robot.unlimited: the {key} limits of {names} are not above 0 in the file, taken as none"
+                f"robot.unlimited: the {key} limits of {names} are none or next to none in the file, taken as no limits"
             )
         values[empty] = np.inf
     return values
 
 
 def require_room(description: Description, key: str, values: Array) -> None:
-    """Refuse velocity or effort limits (n,) within which nothing could move: no override is so, the file's are."""
-    stuck = np.flatnonzero(values <= 0.0)
+    """Refuse velocity or effort limits (n,) within which nothing could move: those of a file may be so."""
+    stuck = np.flatnonzero(values < STILL)
     if stuck.size:
         names = ", ".join(description.joints[i] for i in stuck)
         stated = ", ".join(dict.fromkeys(f"{values[i]:g}" for i in stuck))

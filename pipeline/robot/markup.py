@@ -37,3 +37,11 @@ def parse(data: bytes, file: Path) -> ET.Element:
     except (expat.ExpatError, LookupError, ValueError) as error:  # ValueError: an encoding of several bytes
         raise RobotError(f"robot.urdf = {file}: not well-formed XML ({error})") from None
     return builder.close()
+
+
+def only(element: ET.Element, tag: str, where: str) -> ET.Element | None:
+    """The one element of a tag, or None; raises RobotError for several that say different things."""
+    found = element.findall(tag)
+    if len({ET.tostring(one).strip() for one in found}) > 1:
+        raise RobotError(f"{where} {len(found)} different <{tag}>; one is enough")
+    return found[0] if found else None

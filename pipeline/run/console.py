@@ -1,4 +1,4 @@
-"""What a run says on the terminal: progress while it works, the result and where it lies at the end."""
+"""What a run says on the terminal: progress while it works, then the result, and at the end where it lies."""
 
 from __future__ import annotations
 
@@ -82,6 +82,6 @@ class Console:
         for line in (line for result in results for line in result.said()):
             self.console.print(line, soft_wrap=True, markup=False)
 
-    def written(self, folder: Path) -> None:
+    def where(self, folder: Path) -> None:
         """Where it all lies."""
         self.console.print(f"results in {folder}", soft_wrap=True)

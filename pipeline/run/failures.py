@@ -12,6 +12,7 @@ from hydra.errors import HydraException
 from omegaconf.errors import OmegaConfBaseException
 
 from pipeline.common.errors import InputError
+from pipeline.config.unfolding import TooMany
 from pipeline.run import ownership
 from pipeline.run.refusals import in_one_line
 from pipeline.run.termination import CODE, Terminated, insist
@@ -47,6 +48,8 @@ def told(error: BaseException) -> tuple[str, int]:
             return "what is given is nested too deeply", 2
         case HydraException() | OmegaConfBaseException():
             return in_one_line(error), 2
+        case TooMany():
+            return _joined(error), 2
         case yaml.YAMLError():
             return f"not YAML: {_joined(error)}", 2
         case UnicodeError():

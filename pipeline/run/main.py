@@ -18,6 +18,7 @@ from omegaconf import DictConfig
 from pipeline.common.errors import OutputError
 from pipeline.common.files import shipped
 from pipeline.config.as_written import keep_as_written
+from pipeline.config.unfolding import bound_files, bounded
 from pipeline.run import completion, ownership, session
 from pipeline.run.failures import foreseen, leaves, told, where
 from pipeline.run.refusals import refuse
@@ -94,9 +95,10 @@ def run_job(
     # Hydra then hands its errors to us instead of printing pages and leaving with 1.
     os.environ["HYDRA_FULL_ERROR"] = "1"
     try:
-        with terminable():
+        with terminable(), bounded():
             refuse(asked)
             keep_as_written()
+            bound_files()
             hydra.main(version_base="1.3", config_path=CONF, config_name="config")(job)()
     except BaseException as error:
         if isinstance(error, SystemExit) and not isinstance(error.code, str):

@@ -6,7 +6,7 @@ import shutil
 from pathlib import Path
 from typing import Any
 
-from pipeline.artifacts.artifacts import ARTIFACTS, name, writer
+from pipeline.artifacts.artifacts import ARTIFACTS, name, write
 from pipeline.artifacts.report import Report
 from pipeline.artifacts.summary import summary
 from pipeline.common.versions import versions
@@ -35,6 +35,7 @@ def run(config: RunConfig, folder: Path) -> int:
     with stages("solve"), console.progress(config.name) as progress:
         solutions, seconds = solve(problem, config, Context(config.seed, workers, progress))
     with stages("evaluate"):
+        problem = solutions[0].posed(problem)  # where its timing was to be found, with that of the best
         motions = Motions(config, problem, [evaluate(problem, solution) for solution in solutions], workers)
     with stages("studies"):
         results = tuple(result for study in STUDIES if (result := study(motions)) is not None)
@@ -42,9 +43,9 @@ def run(config: RunConfig, folder: Path) -> int:
     console.report(summary(report), results)
     for artifact in ARTIFACTS:
         with stages(name(artifact)):
-            writer(artifact)(report, folder)
+            write(artifact, report, folder)
     shutil.rmtree(folder / UNFINISHED, ignore_errors=True)
-    console.written(folder)
+    console.where(folder)
     return report.exit_code
 
 

@@ -45,6 +45,7 @@ def _why(group: str, key: str, config: RunConfig) -> str:
     nothing = {
         "export.rate": ("export.method = none", config.export.method == "none"),
         "timing.duration": ("timing.law = from_file", config.timing.law == "from_file"),
+        "timing.ramp": (f"timing.law = {config.timing.law}", config.timing.law != "cruise"),
         "path.orientation_tolerance": ("robot.orientation = none", config.robot.orientation == "none"),
         "robot.pointing": (f"robot.orientation = {config.robot.orientation}", config.robot.orientation != "pointing"),
         "obstacles.margin": ("there are no obstacles.shapes", not config.obstacles.shapes),

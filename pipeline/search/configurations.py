@@ -49,7 +49,7 @@ def random_configurations(
         elif kind == "normal":
             velocity = rng.normal(scale=np.pi, size=(count, n))
         else:
-            from scipy.stats import qmc  # half a second of every run, for a draw that few ask for
+            from scipy.stats import qmc  # takes a quarter of a second to import
 
             velocity = 2 * np.pi * (2 * qmc.LatinHypercube(n, rng=rng).random(count) - 1)
         for _ in range(0 if kind == "uniform" else steps):

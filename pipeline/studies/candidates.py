@@ -85,7 +85,7 @@ def measure(
 
 def draw(study: Candidates, title: str) -> Figure:
     """The mean curve, its fitted power law and the printed one, on logarithmic axes (Fig. 1)."""
-    figure = style.blank(7.0, 4.6)
+    figure = style.sheet(7.0, 4.6)
     axes = figure.add_subplot()
     axes.loglog(study.count, study.distance, ".-", color=style.color("global"), label="mean over populations")
     tail = study.count[study.count >= study.parameters].astype(float)

@@ -223,7 +223,7 @@ def _heavier(plant: Any, factor: float) -> Any:
 
 def draw(loop: ClosedLoop, title: str) -> Figure:
     """Joint and end-effector errors, and torques relative to their limits (in N m without any); saturation shaded."""
-    figure = style.blank(9.0, 7.5)
+    figure = style.sheet(9.0, 7.5)
     panels = figure.subplots(3, 1, sharex=True)
     thin = slice(None, None, max(1, len(loop.time) // POINTS))
     time = loop.time[thin]

@@ -2,26 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
 
+from pipeline.build.rest import suggested, unlimited_start
 from pipeline.common.arrays import Array
+from pipeline.config.options import options
 from pipeline.evaluation.between import Audit, audit
 from pipeline.evaluation.evaluation import Evaluation
 from pipeline.problem.curve import curve, end_speeds, whole
 from pipeline.problem.problem import Problem
+from pipeline.program.spline.program import why_not as unserved
 from pipeline.studies.study import Motions, Result
 
 TOLERANCE = 1e-6  # relative: of limits that are met
 RESTS = 0.01  # of the largest joint speed: what still counts as rest
 NAMED = 3  # motions whose faults are said
-WAY_OUT = (
-    "boundary.rest=[start,end], for a given start with limits.acceleration, makes the planner find one that can be; "
-    "see the experiments sim4_sendable and panda_sendable"
-)
+SENDABLE = "_sendable"  # ends the name of the experiment that makes of another one a motion that can be sent
 BETWEEN = 4  # sub-intervals per knot interval at which the curve is judged, besides its samples
 
 
@@ -30,7 +30,7 @@ class Resampled(Result):
     """Samples at time (K,) [s]: q, qd, qdd (K, n); and what the evaluation's own plant says of their curve.
 
     limit_excess: by kind, relative (see evaluation.limit_excess); worst: where each is largest, (time [s], joint).
-    faults: why it cannot be sent; none if it can.
+    faults: why it cannot be sent; none if it can. strays: whether one of them is its distance from the path.
     """
 
     name: ClassVar[str] = "export"
@@ -46,12 +46,13 @@ class Resampled(Result):
     limit_excess: dict[str, float]
     worst: dict[str, tuple[float, str]]
     faults: tuple[str, ...] = ()
+    strays: bool = False
 
     @property
     def fault(self) -> str:
         """The first of its faults in one sentence."""
         more = len(self.faults) - NAMED
-        return " and ".join([*self.faults[:NAMED], *([f"has {more} more faults"] if more > 0 else [])])
+        return " and ".join([*self.faults[:NAMED], *([f"has {more} more fault{'s' * (more > 1)}"] if more > 0 else [])])
 
     @property
     def keeps_limits(self) -> bool:
@@ -83,10 +84,13 @@ class Resampled(Result):
 
 @dataclass(frozen=True)
 class Nothing(Result):
-    """No motion is good enough to be sent. refused: those that were looked at, the cheapest first."""
+    """No motion is good enough to be sent. refused: those that were looked at, the cheapest first; instead: what to
+    do, in sentences.
+    """
 
     name: ClassVar[str] = "export"
     refused: tuple[Resampled, ...] = ()
+    instead: str = ""
 
     def section(self) -> list[str]:
         if not self.refused:
@@ -95,7 +99,7 @@ class Nothing(Result):
         more = len(self.refused) - len(named)
         others = f"; so it is with {more} more" if more else ""
         return [
-            f"Exported: nothing, since no confirmed motion can be sent: {'; '.join(named)}{others}. {WAY_OUT}; "
+            f"Exported: nothing, since no confirmed motion can be sent: {'; '.join(named)}{others}. {self.instead}"
             "export.force=true writes the cheapest all the same."
         ]
 
@@ -112,7 +116,25 @@ def study(motions: Motions) -> Result | None:
     sent, refused = _sent(motions)
     if sent is not None:
         return sent[1]
-    return Nothing(refused) if refused or asked == "best" else None
+    return Nothing(refused, instead(motions, refused)) if refused or asked == "best" else None
+
+
+def instead(motions: Motions, refused: Sequence[Resampled]) -> str:
+    """What makes a motion that can be sent of this problem, in sentences: words for the command line."""
+    problem, said = motions.problem, []
+    if not all(problem.rest) and problem.reference.timing.at_rest and unserved(problem) is None:
+        words = ["boundary.rest=[start,end]"]
+        if unlimited_start(problem):
+            words.append(f"limits.acceleration={suggested(problem):g}")
+        own = f"{motions.config.name}{SENDABLE}"
+        shipped = f", and so does +experiment={own}" * (own in options("experiment"))
+        said.append(f"{' '.join(words)} makes the planner seek one that can be{shipped}.")
+    for motion in refused:
+        off = float(f"{1.1 * motion.tracking_error:.1e}")
+        if len(motion.faults) == 1 and motion.strays:
+            said.append(f"path.tolerance={off:g} lets {motion.method} {motion.optimum} through.")
+            break
+    return "".join(f"{one} " for one in said)
 
 
 def chosen(motions: Motions) -> Evaluation | None:
@@ -162,6 +184,7 @@ def resample(problem: Problem, evaluation: Evaluation, rate: float) -> Resampled
         checked.limit_excess,
         worst,
         tuple(_faults(problem, evaluation, checked, worst)),
+        checked.tracking_error > problem.reference.tolerance,
     )
 
 
@@ -197,7 +220,7 @@ def sentence(exported: Resampled) -> str:
     if exported.orientation_error > 0:
         head += f" and {exported.orientation_error:.2g} rad off its orientation"
     if exported.faults:
-        return f"{head}, but it {exported.fault}: not to be sent as it is. {WAY_OUT}"
+        return f"{head}, but it {exported.fault}: not to be sent as it is"
     if not exported.limit_excess:
         return f"{head}; the run has no limits to check it against"
     return f"{head} and meets every limit"

@@ -142,7 +142,7 @@ def hypervolume(values: Array) -> float:
 def draw(front: Front, name: str) -> Figure:
     """Both axes labelled, extremes and knee marked, classes by colour, dominated points apart."""
     (x, y), good, table = front.objectives, front.good.sort_values(front.objectives[0]), front.table
-    figure = style.blank(7.4, 5.4)
+    figure = style.sheet(7.4, 5.4)
     axes = figure.add_subplot()
     axes.step(good[x], good[y], where="post", color="0.8", linewidth=1.0, zorder=1, label="dominated region's edge")
     for number in range(1, int(good["path_class"].max()) + 1):

@@ -10,6 +10,7 @@ from pipeline.studies import (
     export,
     front,
     identification,
+    retiming,
     validation,
 )
 from pipeline.studies.study import Study
@@ -20,6 +21,7 @@ STUDIES: tuple[Study, ...] = (
     front.study,
     convergence.study,
     identification.study,
+    retiming.study,
     export.study,
     closed_loop.study,
     candidates.study,

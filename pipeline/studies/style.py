@@ -20,16 +20,6 @@ UNKNOWN = "#44403C"
 FRONT = 19  # points after the first over which a front's hues run from blue to red
 
 
-def blank(width: float, height: float) -> Figure:
-    """An empty figure [in]; only the first one loads matplotlib, after the verdict is on the console."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(width, height), layout="constrained")
-    FigureCanvasAgg(figure)
-    return figure
-
-
 def _split(label: str) -> tuple[str, int]:
     """`global 2` -> `global`, 2; a label without a number is the first optimum of its method."""
     method, _, number = label.rpartition(" ")
@@ -59,3 +49,13 @@ def name(label: str) -> str:
 def joint_color(joint: int) -> str:
     """The colour `#RRGGBB` of joint 0, 1, ...: the table is run through again after its end."""
     return JOINT_COLORS[joint % len(JOINT_COLORS)]
+
+
+def sheet(width: float, height: float) -> Figure:
+    """An empty figure of this size [inch]. Whoever draws nothing does not wait for matplotlib."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure

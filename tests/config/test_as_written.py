@@ -14,8 +14,8 @@ from pipeline.config.run import check
     ("text", "named"),
     [
         ("seed: 010", r"seed = '010': must be a whole number"),
-        ("timing: {duration: 1:30}", r"timing\.duration = '1:30': must be a number > 0 s"),
-        ("timing: {duration: 1:30.5}", r"timing\.duration = '1:30\.5': must be a number > 0 s"),
+        ("timing: {duration: 1:30}", r"timing\.duration = '1:30': must be shortest or a number > 0 s"),
+        ("timing: {duration: 1:30.5}", r"timing\.duration = '1:30\.5': must be shortest or a number > 0 s"),
     ],
 )
 def test_another_base_is_refused(text: str, named: str) -> None:

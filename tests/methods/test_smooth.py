@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +13,7 @@ from pipeline.common.errors import InputError
 from pipeline.config.methods import GlobalOptions
 from pipeline.evaluation.evaluation import evaluate
 from pipeline.methods.global_planner.planner import global_planner
-from pipeline.methods.global_planner.smooth import room, unresolved
+from pipeline.methods.global_planner.smooth import resolved, room
 from pipeline.methods.pareto import pareto
 from pipeline.problem.limits import Limits
 from pipeline.problem.objective import Objective
@@ -30,6 +31,7 @@ def test_rest_asks_for_a_spline_and_differences_refuse_it() -> None:
     (best, *_) = global_planner(problem, FEW)
     assert best.status is Status.SOLVED
     np.testing.assert_allclose(best.trajectory.ends, 0.0, atol=1e-9)
+    assert re.match(r"\d distinct opti.* starts; .* confirmed by IPOPT: constraints to \de-\d+, optim", best.evidence)
     with pytest.raises(InputError, match=r"^global: method.global.transcription = differences keeps neither"):
         global_planner(problem, replace(FEW, transcription="differences"))
     with pytest.raises(InputError, match=r"^pareto: the joints are to rest at an end"):
@@ -37,16 +39,21 @@ def test_rest_asks_for_a_spline_and_differences_refuse_it() -> None:
     assert global_planner(replace(problem, rest=(False, False)), FEW)[0].trajectory.ends is None
 
 
-def test_a_start_that_the_grid_does_not_show_is_said() -> None:
-    """An optimum that jumps to 0.5 rad/s takes 0.05 s to it at 10 rad/s^2: two steps of 0.1 s are too few, 50 do."""
+def test_a_start_that_the_grid_does_not_show_gets_knots() -> None:
+    """What jumps to 0.6 rad/s takes 0.06 s to it at 10 rad/s^2: 0.1 s is too long a step for it, 0.02 s not."""
     problem = replace(free_line(10), boundary=Boundary.FIXED, rest=(True, True))
     problem = replace(problem, limits=replace(Limits.none(3), acceleration=np.full(3, 10.0)))
-    motion = problem.q_init + 0.05 * np.arange(11)[:, None] * np.array([0.1, 1.0, 0.2])
-    said = unresolved(problem, motion)
-    assert "takes 0.05 s within limits.acceleration, less than two of 10 steps" in said
-    assert "timing.steps = 42 or" in said
-    assert unresolved(replace(problem, times=np.linspace(0.0, 1.0, 51)), np.repeat(motion, 5, axis=0)[:51]) == ""
-    assert unresolved(replace(problem, boundary=Boundary.FREE), motion) == ""
+    motion = problem.q_init + 0.06 * np.arange(11)[:, None] * np.array([0.1, 1.0, 0.2])
+    knots = resolved(problem, motion)
+    np.testing.assert_allclose(knots[:7], [0.0, 0.03, 0.06, 0.09, 0.12, 0.18, 0.3], atol=1e-12)
+    np.testing.assert_allclose(knots[6:], problem.times[3:], atol=1e-12)
+    fine, free = replace(problem, times=np.linspace(0.0, 1.0, 51)), replace(problem, boundary=Boundary.FREE)
+    assert len(resolved(fine, np.repeat(motion, 5, axis=0)[:51])) == 51
+    assert len(resolved(free, motion)) == 11
+    by_jerk = replace(problem, limits=replace(problem.bounds, jerk=np.full(3, 960.0)))
+    np.testing.assert_allclose(resolved(by_jerk, motion)[1], 0.03, atol=1e-12)
+    by_jerk = replace(problem, limits=replace(problem.bounds, jerk=np.full(3, 240.0)))
+    np.testing.assert_allclose(resolved(by_jerk, motion)[1], 0.05, atol=1e-12)
 
 
 @pytest.mark.slow
@@ -107,10 +114,10 @@ def test_simulation_3_and_4_from_rest_to_rest() -> None:
     """Simulation 3 costs .1090 then, and 4 has no motion within its limits below 1.005 s (CasADi; `sending`)."""
     rest = ("boundary.rest=[start,end]", "timing.steps=50", "method.global.solver=newton")
     third = prepare(composed("+experiment=sim3", *rest))
-    best = evaluate(third, global_planner(third, FEW)[0])
+    best = evaluate(third, global_planner(third, replace(FEW, optimised=1))[0])
     assert best.integral("torque") == pytest.approx(0.1090, rel=5e-3)
     fourth = prepare(composed("+experiment=sim4", *rest))
-    (answer,) = global_planner(fourth, FEW)
+    (answer,) = global_planner(fourth, replace(FEW, optimised=1))
     shortest = float(answer.message.split("shortest feasible duration ")[1].split()[0])
     assert shortest == pytest.approx(1.005, rel=3e-3)
     assert "cannot be met" in answer.message

@@ -9,6 +9,7 @@ import pytest
 
 from pipeline.common.arrays import Array
 from pipeline.model.arm import Arm
+from pipeline.model.kernel.arm import BLOCK, KernelArm
 from pipeline.model.kernel.chain import Chain
 from pipeline.model.kernel.energy import energy, mass_matrix
 from pipeline.model.kernel.rows import TaskRows
@@ -76,6 +77,23 @@ def test_values_equal_drakes(arm: Arm, rng: np.random.Generator) -> None:
     compare(found.mass, arm.mass_matrix(q), 1e-12)
     compare(mass_matrix(chain, q), arm.mass_matrix(q), 1e-12)
     compare(inverse_dynamics(chain, q, qd, qdd)[0], arm.inverse_dynamics(q, qd, qdd), 1e-12)
+
+
+def test_an_arm_on_the_kernel_is_the_same_arm(arm: Arm, rng: np.random.Generator) -> None:
+    """More knots than one block holds; the derivative of the energy by q is by differences in Drake's arm."""
+    own = KernelArm(arm)
+    q, qd, _ = states(arm, BLOCK + 3, rng)
+    compare(own.position(q), arm.position(q), 1e-12)
+    compare(own.jacobian(q), arm.jacobian(q), 1e-12)
+    compare(own.spatial_jacobian(q), arm.spatial_jacobian(q), 1e-12)
+    compare(own.jacobian_rate_term(q, qd), arm.jacobian_rate_term(q, qd), 1e-12)
+    for one, other in (
+        (own.position_and_jacobian(q), arm.position_and_jacobian(q)),
+        (own.jacobian_and_gradient(q), arm.jacobian_and_gradient(q)),
+        (own.kinetic_energy_gradient(q, qd), arm.kinetic_energy_gradient(q, qd)),
+    ):
+        for mine, drakes, exact in zip(one, other, (1e-12, 1e-8, 1e-12), strict=False):
+            compare(mine, drakes, exact)
 
 
 def test_derivatives_equal_those_of_drakes_plant(arm: Arm, rng: np.random.Generator) -> None:

@@ -46,6 +46,23 @@ def test_the_derivative_of_the_error_equals_central_differences(task: Task, rng:
         np.testing.assert_allclose(jacobian[near], expected[near], atol=2e-7)
 
 
+def test_the_derivative_of_the_error_by_the_target(task: Task, rng: np.random.Generator) -> None:
+    q, h = within_limits(task.arm, 40, rng), 1e-6
+    target = task.value(q + 0.3 * rng.uniform(-1, 1, size=q.shape))
+    rate = rng.normal(size=target.shape)
+    count = len(task.axes)
+
+    def moved(by: float) -> Array:
+        ahead = target + by * rate
+        if target.shape[1] > count:  # the rate's turning is a velocity in the world
+            turned = Rotation.from_rotvec(by * rate[:, count:]) * Rotation.from_rotvec(target[:, count:])
+            ahead[:, count:] = turned.as_rotvec()
+        return ahead
+
+    expected = (task.error(q, moved(h)) - task.error(q, moved(-h))) / (2 * h)
+    np.testing.assert_allclose(task.error_by_target(q, target, rate), expected, atol=2e-7)
+
+
 def test_on_the_target_the_error_is_zero_and_its_derivative_is_the_jacobian(
     task: Task, rng: np.random.Generator
 ) -> None:

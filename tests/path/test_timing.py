@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pipeline.common.arrays import Array
-from pipeline.path.timing import Quintic, RaisedCosine, Stamped, Timing, WithStops
+from pipeline.path.timing import Cruise, Quintic, RaisedCosine, Stamped, Timing, WithStops
 
 
 def knots() -> st.SearchStrategy[tuple[Array, Array]]:
@@ -50,7 +50,24 @@ def test_a_law_with_stops_rests_there_and_shares_its_time_by_length(law: type[Ti
     np.testing.assert_allclose(stopping.sample(middles, 0.5)[1], plain, rtol=1e-9)  # the same speed in all parts
 
 
-def _is_the_derivative(law: Stamped, t: Array) -> None:
+@given(st.floats(0.01, 0.5))
+def test_cruise(ramp: float) -> None:
+    """Its acceleration is zero where it begins, cruises and ends, and with half the time for each end it is the
+    papers' law.
+    """
+    law, t = Cruise(3.0, ramp), np.linspace(0.0, 3.0, 2001)
+    s, sd, sdd = law.sample(np.array([0.0, 3.0 * ramp, 3.0 * (1 - ramp), 3.0]), 2.0)
+    speed = 2.0 / (3.0 - 3.0 * ramp)
+    np.testing.assert_allclose(s, [0.0, speed * 1.5 * ramp, 2.0 - speed * 1.5 * ramp, 2.0], atol=1e-9)
+    np.testing.assert_allclose(sd, [0.0, speed, speed, 0.0], atol=1e-9)
+    np.testing.assert_allclose(sdd, 0.0, atol=1e-6)
+    assert law.sample(t, 2.0)[1].max() <= speed * (1 + 1e-9)
+    _is_the_derivative(law, t)
+    for ours, papers in zip(Cruise(3.0, 0.5).sample(t, 2.0), RaisedCosine(3.0).sample(t, 2.0), strict=True):
+        np.testing.assert_allclose(ours, papers, atol=1e-9)
+
+
+def _is_the_derivative(law: Timing, t: Array) -> None:
     h, inner = 1e-6 * law.duration, t[1:-1]
     ahead, behind, now = law.sample(inner + h, 2.0), law.sample(inner - h, 2.0), law.sample(inner, 2.0)
     scale = np.abs(now[1]).max() + 1e-9

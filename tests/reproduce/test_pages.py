@@ -152,6 +152,13 @@ def test_a_line_per_experiment_and_nothing_twice(
     assert json.loads(records[0])["config"]["name"] == "case1"
 
 
+def test_help(reproduce_here: Callable[..., tuple[int, str, str]], tmp_path: Path) -> None:
+    code, out, error = reproduce_here("--help")
+    assert (code, error) == (0, "")
+    assert "python -m pipeline.reproduce [pmke] [global] [pontryagin]" in out
+    assert not (tmp_path / "here").exists()
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [

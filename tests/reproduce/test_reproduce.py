@@ -12,9 +12,10 @@ import pytest
 from pipeline.config import documents
 from pipeline.config.found import Summary
 from pipeline.reproduce import __main__ as reproduce
+from pipeline.reproduce.pages import index
 from pipeline.reproduce.recompute import recompute
 from pipeline.reproduce.results import ResultError
-from pipeline.reproduce.table import COLUMNS, command, compare, judge
+from pipeline.reproduce.table import COLUMNS, command, compare, counts, judge
 from tests.reproduce.printed import asked, expected, runs_in
 
 
@@ -52,14 +53,16 @@ def test_a_finished_reproduction_says_what_its_runs_say() -> None:
 
 
 @pytest.mark.slow
-def test_a_number_that_no_run_holds_differs_and_says_so(reproduced: Path) -> None:
+def test_a_number_that_is_not_run_or_not_there_says_so(reproduced: Path) -> None:
     (document,) = (d for d in asked() if d.name == "pontryagin")
     runs = runs_in(reproduced)
     del runs["case1"]
     table = compare([document], runs)
     lost = table[table["recomputed"].isna()]
     assert list(lost["place"]) == ["Figure 3", "Figure 4"]
-    assert set(lost["verdict"]) == {"differs"}
+    assert set(lost["verdict"]) == {"not run"}
+    assert counts(table) == {"reproduced": 4, "better": 0, "misprint": 0, "differs": 0, "not run": 2}
+    assert "<td>2</td>" in index([document], table)
     assert set(lost["note"]) == {"no run of experiment case1"}
     row = replace(document.rows[0][1], found=Summary("case4a", "pontryagin_as_printed", 7, "final_error"))
     with pytest.raises(ResultError, match="case4a: no pontryagin_as_printed 7"):

@@ -44,8 +44,14 @@ def test_what_a_file_states(tmp_path: Path) -> None:
         ("- a\n", "no table joint_limits"),
         ("joint_limits: {c: {}}\n", "states limits of c; the arm has a, b"),
         ("joint_limits: {a: 3}\n", "a: a table of keys such as max_acceleration is needed"),
-        ("joint_limits: {a: {has_jerk_limits: true}}\n", "max_jerk of a is missing; a number above 0 is needed"),
-        ("joint_limits: {a: {has_jerk_limits: true, max_jerk: -1}}\n", "max_jerk of a = -1; a number above 0"),
+        (
+            "joint_limits: {a: {has_jerk_limits: true}}\n",
+            "max_jerk of a is missing; one of at least 1e-09 is needed",
+        ),
+        (
+            "joint_limits: {a: {has_jerk_limits: true, max_jerk: -1}}\n",
+            "max_jerk of a = -1; one of at least 1e-09",
+        ),
         ("joint_limits: {a: {has_effort_limits: true, max_effort: .inf}}\n", "max_effort of a = inf"),
         ("joint_limits: {a: {has_position_limits: true, min_position: x}}\n", "min_position of a = x; a number is"),
         ("joint_limits: {\n", "while parsing"),

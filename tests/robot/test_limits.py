@@ -45,7 +45,7 @@ def test_bounds_that_no_position_meets(write: Callable[..., Path], key: str, wor
         urdf.read(write(**{key: word}), "hand")
 
 
-@pytest.mark.parametrize("word", ["0", "-3"])
+@pytest.mark.parametrize("word", ["0", "-3", "9e-10"])
 @pytest.mark.parametrize(("key", "override"), [("velocity", r"limits\.velocity"), ("effort", r"limits\.torque")])
 def test_nothing_moves_within_a_limit_of_zero(write: Callable[..., Path], key: str, override: str, word: str) -> None:
     got = urdf.read(write(**{key: word}), "hand")
@@ -55,7 +55,10 @@ def test_nothing_moves_within_a_limit_of_zero(write: Callable[..., Path], key: s
     freed = urdf.read(write(**{key: word}), "hand", unlimited=[key])
     require_room(freed, key, getattr(freed, key))
     assert getattr(freed, key)[0] == np.inf
-    assert freed.notes == (f"robot.unlimited: the {key} limits of shoulder are not above 0 in the file, taken as none",)
+    assert freed.notes == (
+        f"robot.unlimited: the {key} limits of shoulder are none or next to none in the file, taken as no limits",
+    )
+    require_room(got, key, np.full(2, 1e-9))
 
 
 def test_a_lock_within_and_outside_the_limits(write: Callable[..., Path]) -> None:

@@ -183,6 +183,7 @@ DEFAULTS = {  # what would be 1 kg or 1 kg m^2 that nobody wrote down: old text,
     "no mass": ("<mass>1.0</mass>", "", ["upper", "<mass>"]),
     "a mass of zero": ("<mass>1.0</mass>", "<mass>0</mass>", ["upper", "no mass"]),
     "no inertia": ("<inertia>", "<none>", ["upper", "<inertia>"]),
+    "empty izz": ("<izz>0.015</izz>", "<izz/>", ["upper", "izz ''"]),
     "no izz": ("<izz>0.015</izz>", "", ["upper", "<izz>"]),
     "computed by itself": ("<inertial>", '<inertial auto="true">', ["upper", "auto"]),
     "mass with an underscore": ("<mass>1.0</mass>", "<mass>1_0</mass>", ["upper", "mass", "1_0"]),
@@ -210,6 +211,10 @@ def test_poses_and_limits_that_are_no_numbers(write: Callable[[str, str], Path])
         ('<link name="upper"><pose>', '<link name="upper"><pose>nan ', r"link 'upper' has the pose"),
         ("<velocity>3</velocity>", "<velocity>fast</velocity>", r"joint 'shoulder' has the velocity limit 'fast'"),
         ("<lower>-1.5</lower>", "<lower>nan</lower>", r"joint 'shoulder' has the lower limit 'nan'"),
+        ("<mass>1.0</mass>", "<mass>3</mass><mass>1.0</mass>", "link 'upper' has 2 different <mass>"),
+        ("<izz>0.015</izz>", "<izz>1</izz><izz>0.015</izz>", "link 'upper' has 2 different <izz>"),
+        ("<velocity>3</velocity>", "<velocity>9</velocity><velocity>3</velocity>", "'shoulder' has 2 different <velo"),
+        ("<xyz>0.6 0.8 0</xyz>", "<xyz>1 0 0</xyz><xyz>0.6 0.8 0</xyz>", "joint 'elbow' has 2 different <xyz>"),
         ("<xyz>0.6 0.8 0</xyz>", "<xyz>0.6 0,8 0</xyz>", r"joint 'elbow' has in its axis the xyz '0,8'"),
     ):
         assert old in sound

@@ -56,7 +56,7 @@ FILES = {
     "syntax": (b"path: [1", "not YAML: "),
     "encoding": (b"name: \xff\xfe", "not UTF-8 text: "),
     "depth": (b"a: " + b"[" * 500, "nested too deeply"),
-    "itself": (b"a: &x [*x]", "nested too deeply"),
+    "itself": (b"a: &x [*x]", "an anchor that holds itself"),
     "twice": (b"name: a\nname: b", "not YAML: "),
     "code": (b"name: !!python/object/apply:os.system ['touch ran']", "not YAML: "),
     "nul": (b"a: \0", "not YAML: "),

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
+import subprocess
+import sys
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -14,10 +17,11 @@ import pytest
 from pipeline.artifacts.recording.blueprint import slug
 from pipeline.artifacts.recording.recording import read_series
 from pipeline.build.problem import prepare
+from pipeline.run import run as run_module
 from tests.commands import Answer, call, command
 from tests.once import made_once
 from tests.reports import leave_out_pictures
-from tests.support import FEW_STARTS, RUN_FILES, composed
+from tests.support import FEW_STARTS, ROOT, RUN_FILES, composed
 
 FIGURES = ("stroboscopic", "joints", "energy", "torques")
 
@@ -139,6 +143,29 @@ class TestTraj3:
             assert entry["converged"]
         assert len(by_method["global"]["starts"]) > 1
         assert all(solve["wall_time_s"] > 0 for solve in by_method["global"]["solves"])
+
+
+def test_the_verdict_comes_before_what_is_drawn(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device", "summary.md")
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(run_module, "write", full)
+    words = ("methods=[lsv]", "timing.steps=4", "method.lsv.dt=0.5", "path.length=0.05", "export.method=none")
+    answer = call(monkeypatch, capfd, *words, "hydra.run.dir=results")
+    assert (answer.code, answer.error) == (2, "error: cannot read or write summary.md: No space left on device\n")
+    assert "lsv" in answer.out
+    assert "results in" not in answer.out
+
+
+@pytest.mark.slow
+def test_nobody_waits_for_what_draws_and_records(tmp_path: Path) -> None:
+    heavy = "{'matplotlib', 'rerun', 'scipy.stats', 'casadi'}"
+    asked = f"import sys; import pipeline.run.run; sys.exit(len({heavy} & {{*sys.modules}}))"
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    assert subprocess.run([sys.executable, "-c", asked], cwd=tmp_path, env=environment, check=False).returncode == 0
 
 
 # --- failures --------------------------------------------------------------------------------------------------------

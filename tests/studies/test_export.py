@@ -11,6 +11,7 @@ import pytest
 
 from pipeline.artifacts.motion_files import save
 from pipeline.build.problem import prepare
+from pipeline.build.rest import suggested
 from pipeline.config.methods import GlobalOptions
 from pipeline.config.run import RunConfig
 from pipeline.evaluation.evaluation import Evaluation, evaluate
@@ -21,7 +22,7 @@ from pipeline.problem.limits import Limits
 from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Solution, Status, Trajectory
 from pipeline.robot.shapes import Shape
-from pipeline.studies.export import Nothing, Resampled, resample, sentence, study
+from pipeline.studies.export import Nothing, Resampled, instead, resample, sentence, study
 from pipeline.studies.study import Motions, Result
 from tests.support import ROOT, composed
 
@@ -179,7 +180,7 @@ def test_the_best_motion_is_the_cheapest_that_hits_nothing() -> None:
 # --- what cannot be sent --------------------------------------------------------------------------------------------
 
 
-def test_a_jump_of_velocity_is_not_sent(line: Case) -> None:
+def test_a_jump_of_velocity_is_not_sent(line: Case, at_rest: Case) -> None:
     """An optimum by differences from a given start jumps to its speed: the curve at rest would ask for an impulse."""
     motion = resample(*line, 100.0)
     (fault,) = motion.faults
@@ -191,7 +192,15 @@ def test_a_jump_of_velocity_is_not_sent(line: Case) -> None:
     assert isinstance(nothing, Nothing)
     said = nothing.section()[0]
     assert "global 1 starts with a jump of velocity" in said
-    assert "boundary.rest=[start,end]" in said
+    number = suggested(line[0])
+    assert f"boundary.rest=[start,end] limits.acceleration={number:g} makes the planner seek one that can be." in said
+    third = composed("+experiment=sim3", "limits=none", "limits.power=null")
+    words = instead(Motions(third, replace(at_rest[0], rest=(False, False)), ()), ())
+    assert (
+        words
+        == "boundary.rest=[start,end] makes the planner seek one that can be, and so does +experiment=sim3_sendable. "
+    )
+    assert instead(Motions(third, replace(at_rest[0], rest=(True, True)), ()), ()) == ""
 
 
 def test_a_motion_that_ends_while_it_moves_or_off_its_path_is_not_sent(at_rest: Case) -> None:
@@ -204,6 +213,17 @@ def test_a_motion_that_ends_while_it_moves_or_off_its_path_is_not_sent(at_rest: 
     assert len(faults) == 2
     assert faults[0].startswith("ends while it moves (joint")
     assert "off its path, more than path.tolerance = 0.0001 m" in faults[1]
+
+
+def test_a_tolerance_that_would_do_is_named(at_rest: Case) -> None:
+    problem, motion = at_rest
+    strict = replace(problem, reference=replace(problem.reference, tolerance=1e-9), rest=(True, True))
+    refused = resample(strict, motion, 50.0)
+    words = instead(Motions(composed(), strict, ()), [refused])
+    given = float(words.split("path.tolerance=")[1].split()[0])
+    assert refused.tracking_error < given < 1.2 * refused.tracking_error
+    again = replace(strict, reference=replace(strict.reference, tolerance=given))
+    assert resample(again, motion, 50.0).faults == ()
 
 
 @pytest.mark.slow

@@ -63,18 +63,23 @@ class Optimum:
     @property
     def evidence(self) -> str:
         """What IPOPT says of it, on its last grid."""
-        told = next((solve for solve in reversed(self.solves) if "optimality" in solve), None)
-        if told is None:
-            return ""
-        return (
-            f"confirmed by IPOPT: constraints to {told['violation']:.0e}, optimality to {told['optimality']:.0e}, "
-            f"{told['iterations']} iteration{'' if told['iterations'] == 1 else 's'}"
-        )
+        return confirmed(self.solves)
 
     @property
     def final(self) -> bool:
         """Whether it would come out the same again: no clock has stopped a solve that led to it."""
         return all(solve.get("status") != STOPPED for solve in self.solves)
+
+
+def confirmed(solves: list[dict[str, Any]]) -> str:
+    """What IPOPT says of the last solve of which its optimality is known; nothing where it is of none."""
+    told = next((solve for solve in reversed(solves) if "optimality" in solve), None)
+    if told is None:
+        return ""
+    return (
+        f"confirmed by IPOPT: constraints to {told['violation']:.0e}, optimality to {told['optimality']:.0e}, "
+        f"{told['iterations']} iteration{'' if told['iterations'] == 1 else 's'}"
+    )
 
 
 def first_order(problem: Problem) -> Problem:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -21,10 +20,11 @@ from pipeline.methods.global_planner.basins import Basins, basins
 from pipeline.methods.global_planner.batch import JUMPS, Batch
 from pipeline.methods.global_planner.grids import coarsest, finer, on_knots, refinement
 from pipeline.methods.global_planner.optimum import Optimum, go_on, optimise_start, refine
-from pipeline.methods.global_planner.reasons import no_feasible, no_optimum, no_start
-from pipeline.methods.global_planner.smooth import freer, rough, smooth, splined, unserved
+from pipeline.methods.global_planner.reasons import counted, no_feasible, no_optimum, no_start
+from pipeline.methods.global_planner.smooth import freer, nothing, rough, smooth, splined, unserved
 from pipeline.methods.global_planner.starts import Starts
-from pipeline.methods.method import ANY, Context, Method
+from pipeline.methods.global_planner.timed import timed
+from pipeline.methods.method import WITH_TIMING, Context, Method
 from pipeline.model.kinematics import wrap
 from pipeline.problem.limits import LIMIT_KINDS
 from pipeline.problem.problem import Problem
@@ -57,11 +57,13 @@ def solve(problem: Problem, options: GlobalOptions, context: Context) -> list[So
     """The distinct optima found from these starts, best first."""
     if not splined(problem, options):
         return by_differences(problem, options, context)
-    found = by_differences(rough(problem), options, context)
-    if not found[0].found and problem.constrained:
+    found = by_differences((freer if problem.free_timing else rough)(problem), options, context)
+    if not found[0].found and problem.constrained and not problem.free_timing:
         found = max(found, by_differences(freer(problem), options, context), key=lambda motions: motions[0].found)
     if found[0].found:  # on the knots that the path needs
         problem = replace(problem, times=found[0].trajectory.time)
+    if problem.free_timing:
+        return timed(problem, found, options, context) if found[0].found else found
     return smooth(problem, found, options, context)
 
 
@@ -70,13 +72,13 @@ def by_differences(problem: Problem, options: GlobalOptions, context: Context) -
     why = Batch.without(problem, options)
     times, too_coarse = on_knots(problem, options.refine_to)
     if too_coarse:
-        return [_nothing(problem, Status.NOT_CONVERGED, too_coarse, {})]
+        return [nothing(problem, Status.NOT_CONVERGED, too_coarse, {})]
     asked, problem = len(problem.times) - 1, replace(problem, times=times)
     grids = refinement(times, coarsest(problem, options.coarse_steps, STEPS if why is None else STEPS_ALONE))
     drawn = Starts(problem, grids[0], options, np.random.default_rng(context.seed))
     motions, log = drawn.first, drawn.log
     if not len(motions):
-        return [_nothing(problem, Status.INFEASIBLE, no_start(problem, log.get("drawn", 0)), log)]
+        return [nothing(problem, Status.INFEASIBLE, no_start(problem, log.get("drawn", 0)), log)]
 
     batch = Batch(problem, options) if why is None else None
     log["solver"] = f"ipopt ({why})" if batch is None else batch.words
@@ -90,7 +92,7 @@ def by_differences(problem: Problem, options: GlobalOptions, context: Context) -
             if starts[-1].converged:
                 break
         elif relaxed is not None and (relaxed.worst.relative > HOPELESS or len(grids) == 1):
-            return [_nothing(problem, Status.INFEASIBLE, no_feasible(len(motions), relaxed), log)]
+            return [nothing(problem, Status.INFEASIBLE, no_feasible(len(motions), relaxed), log)]
         if len(grids) == 1:
             break
         # A coarse grid can be infeasible where a finer one is not: its finite differences are other numbers.
@@ -114,11 +116,10 @@ def by_differences(problem: Problem, options: GlobalOptions, context: Context) -
     log["jumping_optima"] = coarse.jumping + sum(fine.converged and not fine.continuous for fine in refined)
     if not found:
         why_not = no_optimum(problem, grids[0], starts, refined, coarse.jumping)
-        return [_nothing(problem, Status.NOT_CONVERGED, why_not, log)]
+        return [nothing(problem, Status.NOT_CONVERGED, why_not, log)]
     members = {id(fine): count for fine, count in found}
     ranked = basins(problem, problem.times, [fine for fine, _ in found], options.same_path).optima
-    count = f"{len(ranked)} distinct optim{'um' if len(ranked) == 1 else 'a'} found from {len(starts)} starts"
-    words = f"{count}; the last {coarse.barren} starts brought nothing new; "
+    words = counted(len(ranked), len(starts), coarse.barren)
     solutions = []
     for rank, fine in enumerate(ranked):
         own = {"starts_in_basin": members[id(fine)], "solves": fine.solves}
@@ -168,7 +169,7 @@ def refuses(problem: Problem, options: GlobalOptions) -> str | None:
     return why and f"method.global.starts = {words}: {why}; starts = roadmap serves every problem"
 
 
-global_planner = Method("global", "Planner's optimum", "#2F855A", GlobalOptions, ANY, solve, refuses)
+global_planner = Method("global", "Planner's optimum", "#2F855A", GlobalOptions, WITH_TIMING, solve, refuses)
 
 
 def _good(optimum: Optimum) -> bool:
@@ -289,11 +290,6 @@ def _to_the_end(
         newer = iter(_refine_all(problem, grids[-2:], options, again, batch, context))
         refined = [next(newer) if _good(fine) else fine for fine in refined]
     return problem, grids, refined
-
-
-def _nothing(problem: Problem, status: Status, message: str, log: dict[str, Any]) -> Solution:
-    standing = np.tile(problem.q_init, (len(problem.times), 1))
-    return Solution("global", Trajectory(problem.times, standing), status, message, statistics=log, found=False)
 
 
 def _relaxed(problem: Problem, times: Array, motions: Array) -> Relaxed | None:

@@ -1,4 +1,6 @@
-"""Why the planner has no motion, in one line: what was tried, how near it came, and what else to try."""
+"""What speaks for the planner's motions, or why it has none, in one line: what was tried, how near it came, what else
+to try.
+"""
 
 from __future__ import annotations
 
@@ -15,6 +17,12 @@ from pipeline.program.feasibility import Relaxed, violations
 OTHERS = "more starts (method.global.optimised) or other ones (method.global.starts)"
 
 REACHED = 1e-6  # [m, rad]
+
+
+def counted(optima: int, starts: int, barren: int) -> str:
+    """How many optima came of how many starts."""
+    count = f"{optima} distinct optim{'um' if optima == 1 else 'a'} found from {starts} starts"
+    return f"{count}; the last {barren} starts brought nothing new; "
 
 
 def no_start(problem: Problem, drawn: int) -> str:

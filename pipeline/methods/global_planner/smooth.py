@@ -13,6 +13,8 @@ from scipy.interpolate import CubicSpline
 
 from pipeline.common.arrays import Array
 from pipeline.config.methods import GlobalOptions
+from pipeline.methods.global_planner.optimum import confirmed
+from pipeline.methods.global_planner.reasons import counted
 from pipeline.methods.method import Context
 from pipeline.problem.limits import FREE, LIMIT_KINDS
 from pipeline.problem.problem import Boundary, Problem
@@ -35,6 +37,12 @@ TRACKING = 1e-8  # [m] at every knot; where two are left out, the path's own tol
 ENOUGH = 1e-6  # relative: how well limits must be kept
 
 
+SHOWN = 1.5  # steps in a start from rest that show it
+
+
+LEAST = 1e-4  # of the motion time: a start from rest that takes less is not shown
+
+
 @dataclass(frozen=True)
 class Smooth:
     """A spline, whether it is an optimum, its objective; and the solves that led to it."""
@@ -47,7 +55,7 @@ class Smooth:
 
 
 @dataclass
-class _Solver:
+class Searches:
     """Solves with their statistics."""
 
     options: GlobalOptions
@@ -65,6 +73,10 @@ class _Solver:
         self.last = solved.curve if solved.outcome.converged else self.last
         return solved
 
+    def confirm(self, solved: Solved) -> None:
+        """Note what IPOPT has left of the last solve."""
+        self.solves[-1]["violation"], self.solves[-1]["optimality"] = solved.residuals()
+
     def lazily(self, problem: Problem, guess: Curve) -> Solved:
         """Torque and power limits come in only where the optimum without them breaks them."""
         loose = without_forces(problem)
@@ -79,7 +91,7 @@ class _Solver:
 
 def splined(problem: Problem, options: GlobalOptions) -> bool:
     """Whether the motion is to be a spline: asked for by name, or by rest and limits that differences do not know."""
-    asks = any(problem.rest) or problem.bounds.smooth
+    asks = any(problem.rest) or problem.bounds.smooth or problem.free_timing
     return options.transcription == "spline" or (options.transcription is None and asks)
 
 
@@ -99,7 +111,8 @@ def unserved(problem: Problem, options: GlobalOptions) -> str | None:
 def rough(problem: Problem) -> Problem:
     """The problem without what differences do not know."""
     limits = replace(problem.bounds, acceleration=FREE, jerk=FREE)
-    return replace(problem, rest=(False, False), zero_acceleration=False, limits=limits)
+    given = replace(problem, rest=(False, False), zero_acceleration=False, limits=limits)
+    return replace(given, free_law=False, free_duration=False)
 
 
 def freer(problem: Problem) -> Problem:
@@ -109,25 +122,24 @@ def freer(problem: Problem) -> Problem:
     return replace(loose, limits=replace(loose.bounds, velocity=free))
 
 
-def unresolved(problem: Problem, motion: Array) -> str:
-    """That the grid is too coarse for the start from rest, and which would do; nothing where it is not.
+def resolved(problem: Problem, motion: Array) -> Array:
+    """The problem's knots, and as many more at a start from rest as show it.
 
-    Within the limits of acceleration the joints take some time to the speed at which the optimum by differences,
-    `motion`, jumps off: two steps are needed to see it.
+    Within their limits the joints take some time to the speed at which the optimum by differences, `motion`, jumps off.
+    Where a step and a half do not fall into it, two do, two fall behind it, and from there on each is
+    twice the one before.
     """
     bounds, times = problem.bounds, problem.times
     if not (problem.rest[0] and problem.boundary is Boundary.FIXED) or problem.objective.second_order:
-        return ""
+        return times
     jump = np.abs(motion[1] - motion[0]) / (times[1] - times[0])
-    takes, steps = float((jump / bounds.acceleration).max()), len(times) - 1
-    needed = 2 * problem.reference.duration / takes if takes > 0 else 0.0
-    if needed <= steps or takes == 0:
-        return ""
-    enough = float(f"{1.05 * needed:.1e}")
-    return (
-        f"the start from rest takes {takes:.2g} s within limits.acceleration, less than two of {steps} steps, and its "
-        f"energy depends on the grid a little: timing.steps = {enough:.0f} or a smaller limit shows it"
-    )
+    takes = float(np.maximum(jump / bounds.acceleration, 2 * np.sqrt(jump / bounds.jerk)).max())
+    first = float(times[1] - times[0])
+    if takes >= SHOWN * first or takes <= LEAST * problem.reference.duration:
+        return times
+    steps = takes / 2 * np.array([1.0, 1.0, 1.0, *2.0 ** np.arange(40)])
+    early = times[0] + np.cumsum(steps[steps < first])
+    return np.concatenate([times[:1], early, times[times > early[-1] + first / 2]])
 
 
 def smooth(problem: Problem, found: list[Solution], options: GlobalOptions, context: Context) -> list[Solution]:
@@ -135,6 +147,8 @@ def smooth(problem: Problem, found: list[Solution], options: GlobalOptions, cont
     motions = [solution.trajectory.q for solution in found if solution.found]
     if not motions:
         return found
+    knots, given = resolved(problem, motions[0]), problem.times
+    problem, motions = replace(problem, times=knots), list(CubicSpline(given, motions, axis=1)(knots))
     splines = context.workers.map(refine, (problem, options), motions)
     log = found[0].statistics
     if not any(spline.converged for spline in splines):
@@ -149,18 +163,22 @@ def smooth(problem: Problem, found: list[Solution], options: GlobalOptions, cont
     costs = np.array([spline.cost for spline in good])
     every = np.array([spline.curve.q for spline in good])
     revolute = problem.task.arm.description.revolute
+    ranked = distinct(every, costs, len(good), options.same_path, revolute)
+    words = counted(len(ranked), len(log.get("starts", splines)), log.get("barren_starts", 0))
+    more = f"{len(knots) - len(given)} more knots show the start from rest" * (len(knots) > len(given))
     solutions = []
-    for rank, index in enumerate(distinct(every, costs, len(good), options.same_path, revolute)):
+    for rank, index in enumerate(ranked):
         own = good[index]
         solutions.append(
             Solution(
                 "global",
                 Trajectory(problem.times, own.curve.q, own.curve.ends),
                 Status.SOLVED,
-                "; ".join(filter(None, [found[0].message, unresolved(problem, motions[0])])) if rank == 0 else "",
+                "; ".join(filter(None, [found[0].message, more])) if rank == 0 else "",
                 optimum=rank + 1,
                 tracking_tolerance=problem.reference.tolerance if problem.zero_acceleration else TRACKING,
                 limits_kept=LIMIT_KINDS,
+                evidence=(words if rank == 0 else "") + confirmed(own.solves),
                 statistics={**(log if rank == 0 else {}), "spline_solves": own.solves, "cost": own.cost},
             )
         )
@@ -170,21 +188,26 @@ def smooth(problem: Problem, found: list[Solution], options: GlobalOptions, cont
 def refine(context: tuple[Problem, GlobalOptions], motion: Array) -> Smooth:
     """The spline that is nearest to an optimum by differences: coarse to fine where torques count."""
     problem, options = context
-    solver, grids = _Solver(options), _grids(problem)
-    guess = Curve.through(problem, grids[0], CubicSpline(problem.times, motion)(grids[0]))
+    guess = Curve.through(problem, problem.times, motion)
+    served = not problem.objective.second_order and keeps_forces(problem, guess)
+    solver, finer = Searches(options), [problem.times] if served else grids(problem)
+    if not served:
+        guess = Curve.through(problem, finer[0], CubicSpline(problem.times, motion)(finer[0]))
     solved = solver.lazily(problem, guess)
-    if len(grids) > 1 and not solved.outcome.converged:
-        guess = Curve.through(problem, grids[-1], motion)
+    if len(finer) > 1 and not solved.outcome.converged:
+        guess = Curve.through(problem, finer[-1], motion)
         solved = solver.lazily(problem, guess)
-    elif len(grids) > 1:
+    elif len(finer) > 1:
         loose = keeps_forces(problem, solved.curve)
-        for grid in grids[1:]:
+        for grid in finer[1:]:
             guess = Curve.through(problem, grid, solved.curve(grid), solved.curve.ends)
             solved = solver.lazily(problem, guess) if loose else solver.whole(problem, guess)
     if solved.outcome.converged:
         solved, further = tighten(problem, solved, **solver.given)
         for one in further:
             solver.note(one)
+    if solved.outcome.converged:
+        solver.confirm(solved)
     kept = all(float(excess.max()) <= ENOUGH for excess in excesses(problem, solved.curve).values())
     status = solved.outcome.status if kept or not solved.outcome.converged else "exceeds a limit between its knots"
     good = kept and solved.outcome.converged
@@ -195,8 +218,8 @@ def refine(context: tuple[Problem, GlobalOptions], motion: Array) -> Smooth:
 def shortest(context: tuple[Problem, GlobalOptions], start: Curve) -> Smooth:
     """The motion of least time from `start`, the law of the path kept; `cost`: that time over the one asked for."""
     problem, options = context
-    solver, curve = _Solver(options), start
-    for grid in _grids(problem):
+    solver, curve = Searches(options), start
+    for grid in grids(problem):
         guess = Curve.through(problem, grid, curve(grid), curve.ends)
         program = transcribe(problem, guess, stretch=room(problem, guess))
         solved = solver.note(program.solve(**solver.given))
@@ -215,7 +238,7 @@ def room(problem: Problem, curve: Curve) -> float:
     )
 
 
-def _grids(problem: Problem) -> list[Array]:
+def grids(problem: Problem) -> list[Array]:
     """One grid, but two or three where torques count."""
     intervals = len(problem.times) - 1
     bounds = problem.bounds
@@ -230,16 +253,21 @@ def _grids(problem: Problem) -> list[Array]:
 def _nothing(problem: Problem, fastest: Smooth | None, splines: list[Smooth], log: dict[str, Any]) -> Solution:
     """No spline keeps every limit: which one cannot be met, and in what time all could."""
     tried = f"none of {len(splines)} optima" if len(splines) > 1 else "the one optimum found"
-    standing = Trajectory(problem.times, np.tile(problem.q_init, (len(problem.times), 1)))
     statistics = {**log, "spline_solves": [spline.solves for spline in splines]}
     if fastest is None or not np.isfinite(fastest.cost):
         words = "; ".join(sorted({spline.status for spline in splines}))
         message = f"{tried} leads to a smooth motion within all limits ({words}); try more knots (timing.steps)"
-        return Solution("global", standing, Status.NOT_CONVERGED, message, statistics=statistics, found=False)
+        return nothing(problem, Status.NOT_CONVERGED, message, statistics)
     violation, duration = worst(problem, fastest.curve), problem.reference.duration * fastest.cost
     assert violation is not None
     message = (
         f"{violation.bound} cannot be met between the knots: the least excess found is {violation.extent}; "
         f"shortest feasible duration {duration:.4g} s"
     )
-    return Solution("global", standing, Status.INFEASIBLE, message, statistics=statistics, found=False)
+    return nothing(problem, Status.INFEASIBLE, message, statistics)
+
+
+def nothing(problem: Problem, status: Status, message: str, log: dict[str, Any]) -> Solution:
+    """The answer that there is no motion, and why."""
+    standing = Trajectory(problem.times, np.tile(problem.q_init, (len(problem.times), 1)))
+    return Solution("global", standing, status, message, statistics=log, found=False)

@@ -23,7 +23,7 @@ from pipeline.methods.correction import diverges
 from pipeline.methods.method import ANY, Context, Method
 from pipeline.methods.pmke.prediction import path_weight, rollout, solve_window, window_objective
 from pipeline.methods.pmke.window import Window
-from pipeline.methods.singularity import SingularityWatch
+from pipeline.methods.singularity import SingularityWatch, lost
 from pipeline.model.kinematics import least_velocity, project
 from pipeline.problem.lagrangian import Lagrangian
 from pipeline.problem.objective import Objective
@@ -70,6 +70,8 @@ def _follow(problem: Problem, options: PmkeOptions) -> Solution:
         toward = arm.follow(q[i - 1][None], (prediction(min(time[i], prediction.t[-1])) - q[i - 1])[None] / dt)[0]
         qd[i] = inverse @ command + toward - inverse @ (jacobian[0] @ toward)
         q[i] = q[i - 1] + dt * qd[i]
+        if lost(q[i]):
+            return watch.lost("pmke", time, problem.q_init, i)
     statistics = {
         "steps": steps,
         "horizon": horizon,

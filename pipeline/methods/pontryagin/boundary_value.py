@@ -19,6 +19,7 @@ from pipeline.config.methods import PontryaginOptions
 from pipeline.methods.method import Context, Method
 from pipeline.methods.pontryagin.conditions import SERVES, costates, null_space, rates, transversality
 from pipeline.methods.pontryagin.second_variation import morse_index
+from pipeline.model.kernel.arm import on_kernel
 from pipeline.model.kinematics import project, pseudoinverse
 from pipeline.problem.lagrangian import Lagrangian
 from pipeline.problem.problem import Boundary, Problem
@@ -66,7 +67,7 @@ def solve(problem: Problem, options: PontryaginOptions, context: Context) -> lis
     """Every extremal found, least objective first, on the knots that their path needs. Statistics: `integral`, the
     objective in continuous time, `transversality_start` and `_end`, `kind` (minimum or saddle) and `index`.
     """
-    problem = replace(problem, times=on_path(problem))
+    problem = replace(problem, times=on_path(problem), task=on_kernel(problem.task))
     guesses = _guesses(problem, options, np.random.default_rng(context.seed))
     best = np.inf
 

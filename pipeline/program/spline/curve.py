@@ -15,6 +15,8 @@ from pipeline.problem.objective import Objective
 from pipeline.problem.problem import Boundary, Problem
 from pipeline.problem.turns import full_turns
 
+EVEN = 1e-9  # of the motion time: intervals that differ by less are of one length
+
 
 @dataclass(frozen=True)
 class Curve:
@@ -63,20 +65,22 @@ def spline_through(problem: Problem, times: Array, q: Array, ends: Array | None)
 def stations(problem: Problem, curve: Curve) -> tuple[Array, Array, Array]:
     """Where the energy of a spline is summed up: q, qd (S, n) and the weights (S,) [s].
 
-    The midpoint rule where no end is free: half the stations. A free end needs Simpson's rule: the midpoint rule does
-    not see motions that alternate from knot to knot and fade from an end by -3 + 2 sqrt 2 each.
+    The midpoint rule where it does: half the stations. A free end needs Simpson's rule: the midpoint rule does not see
+    motions that alternate from knot to knot and fade from an end by -3 + 2 sqrt 2 each. So do uneven knots: its errors
+    cancel from interval to interval on even ones alone.
     """
     middle = (curve.times[1:] + curve.times[:-1]) / 2
     q, qd, dt = curve(middle), curve(middle, 1), np.diff(curve.times)
-    if free_ends(problem):
+    if by_simpson(problem, curve.times):
         weights = np.concatenate([trapezoid_weights(curve.times) / 3, dt * 2 / 3])
         return np.vstack([curve.q, q]), np.vstack([curve.v, qd]), weights
     return q, qd, dt
 
 
-def free_ends(problem: Problem) -> bool:
-    """Whether there is an end at which the velocity is not given."""
-    return problem.boundary is not Boundary.CYCLIC and not all(problem.rest)
+def by_simpson(problem: Problem, times: Array) -> bool:
+    """Whether there is an end at which the velocity is not given, or the knots are uneven."""
+    free_ends = problem.boundary is not Boundary.CYCLIC and not all(problem.rest)
+    return free_ends or float(np.ptp(np.diff(times))) > EVEN * float(times[-1] - times[0])
 
 
 def integrals(problem: Problem, curve: Curve) -> Costs:

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline.common.arrays import Array
+from pipeline.path.timing import Found
 from pipeline.problem.lagrangian import trapezoid_weights
 from pipeline.problem.problem import Boundary, Problem
 from pipeline.program import ipopt
 from pipeline.program.program import Lifted
+from pipeline.program.residuals import residuals
 from pipeline.program.scaling import POSITION_SCALE, Sums, scale
-from pipeline.program.spline.curve import Curve, free_ends, integrals, stations
+from pipeline.program.spline.curve import Curve, by_simpson, integrals, stations
 
 SMALL = 3e-4  # of velocities and accelerations among the unknowns, relative to the guess's, with the kinetic energy
 
@@ -38,13 +41,41 @@ class Tightened:
 
 
 @dataclass(frozen=True)
+class Law:
+    """The law of the path as unknowns at the knots: s, sd, sdd (N + 1, 1); what a meter (per second ...) is there."""
+
+    s: NDArray[Any]
+    sd: NDArray[Any]
+    sdd: NDArray[Any]
+    units: tuple[float, ...]
+
+    @property
+    def s_unit(self) -> float:
+        return self.units[0]
+
+
+@dataclass(frozen=True)
 class Solved:
-    """A spline as IPOPT leaves it; iterations; stretch: what its times are to be multiplied with."""
+    """A spline as IPOPT leaves it; iterations; program: the solved one; stretch: what its times are to be multiplied
+    with; law: that of the path, where it was free.
+    """
 
     curve: Curve
     outcome: ipopt.Outcome
     iterations: int
-    stretch: float = field(default=1.0)
+    program: Spline
+    stretch: float = 1.0
+    law: Found | None = None
+
+    def timed(self, problem: Problem) -> Problem:
+        """The problem with the law that was found, if it was free."""
+        if self.law is None:
+            return problem
+        return replace(problem, reference=replace(problem.reference, timing=self.law))
+
+    def residuals(self) -> tuple[float, float]:
+        """Violation and optimality that IPOPT has left, see `residuals.py`."""
+        return residuals(self.program.drake, self.outcome.result)
 
 
 class Spline(Lifted):
@@ -65,16 +96,35 @@ class Spline(Lifted):
         if self.counts:
             self.w = self.new("w", self.scaling.to_w(velocity))
             self.middle = self.new("middle", POSITION_SCALE * middle)
-            self.stations = np.vstack([self.y, self.middle]) if free_ends(problem) else self.middle
+            self.stations = np.vstack([self.y, self.middle]) if by_simpson(problem, guess.times) else self.middle
         if self.forces:
             self.new("forces", self.scaling.force * costs.tau[:, self.forces.rows])
+        self.law = self._law(small) if problem.free_law else None
         # r, r^2, r^3
         self.stretch = None if stretch is None else self.new("stretch", stretch ** np.array([1.0, 2.0, 3.0]))
-        if problem.zero_acceleration and not self.closed:
+        if problem.zero_acceleration:
             # Ends at rest without acceleration give the path's rows there all that they can be given.
             self.left_out = tuple(
                 knot for knot, rests in zip((1, self.intervals - 1), problem.rest, strict=True) if rests
             )
+
+    def _law(self, small: float) -> Law:
+        reference = self.problem.reference
+        values = [
+            value[:, None] for value in reference.timing.sample(self.times - self.times[0], reference.geometry.length)
+        ]
+        units = [POSITION_SCALE / reference.geometry.length, *(small / _size(value) for value in values[1:])]
+        made = [
+            self.new(name, unit * value) for name, unit, value in zip(("s", "sd", "sdd"), units, values, strict=True)
+        ]
+        return Law(made[0], made[1], made[2], tuple(units))
+
+    def unit(self, own: NDArray[Any]) -> float:
+        """What one radian or meter (per second ...) is among these unknowns."""
+        units = {id(self.v): self.v_unit, id(self.a): self.a_unit}
+        if self.law is not None:
+            units |= dict(zip(map(id, (self.law.s, self.law.sd, self.law.sdd)), self.law.units, strict=True))
+        return units.get(id(own), POSITION_SCALE)
 
     def solve(self, **options: Any) -> Solved:
         """Solve from the guess."""
@@ -82,7 +132,11 @@ class Spline(Lifted):
         q, v, a = (self.read(outcome, unknowns) for unknowns in (self.y, self.v, self.a))
         curve = Curve(self.times, q / POSITION_SCALE, v / self.v_unit, a / self.a_unit)
         stretch = 1.0 if self.stretch is None else float(self.read(outcome, self.stretch)[0])
-        return Solved(curve, outcome, iterations, stretch)
+        law = None
+        if self.law is not None:
+            s = self.read(outcome, self.law.s)[:, 0] / self.law.s_unit
+            law = Found(tuple((self.times - self.times[0]).tolist()), tuple((s / s[-1]).tolist()))
+        return Solved(curve, outcome, iterations, self, stretch, law)
 
 
 def _size(values: Array) -> float:

@@ -17,15 +17,20 @@ LEAST, MOST = 0.02, 50.0  # times the motion time
 
 def link(program: Spline) -> None:
     """v1 - v0 = h/2 (a0 + a1) and q1 - q0 = h v0 + h^2/6 (2 a0 + a1) over every interval."""
+    continuous(program, program.y, program.v, program.a)
+
+
+def continuous(program: Spline, position: Any, velocity: Any, acceleration: Any) -> None:
+    """The same of any spline, by its unknowns at the knots, each (N + 1, width)."""
     h = program.dt
-    velocity = [(_pairs(-1.0, 1.0, h), program.v), (_pairs(-h / 2, -h / 2, h), program.a)]
-    position = [
-        (_pairs(-1.0, 1.0, h), program.y),
-        (_pairs(-h, 0.0, h), program.v),
-        (_pairs(-(h**2) / 3, -(h**2) / 6, h), program.a),
+    first = [(pairs(-1.0, 1.0, h), velocity), (pairs(-h / 2, -h / 2, h), acceleration)]
+    second = [
+        (pairs(-1.0, 1.0, h), position),
+        (pairs(-h, 0.0, h), velocity),
+        (pairs(-(h**2) / 3, -(h**2) / 6, h), acceleration),
     ]
-    for parts, unit in ((velocity, program.v_unit), (position, POSITION_SCALE)):
-        _equal(program, parts, unit)
+    _equal(program, first, program.unit(velocity))
+    _equal(program, second, program.unit(position))
 
 
 def middle(program: Spline) -> None:
@@ -34,10 +39,10 @@ def middle(program: Spline) -> None:
         return
     h, half = program.dt, 0.5 * np.ones(program.intervals)
     own = sp.eye_array(program.intervals)
-    parts = [(-own, program.middle), (_pairs(half, half, h), program.y), (_pairs(h / 8, -h / 8, h), program.v)]
+    parts = [(-own, program.middle), (pairs(half, half, h), program.y), (pairs(h / 8, -h / 8, h), program.v)]
     _equal(program, parts, POSITION_SCALE)
     first = len(program.w) - program.intervals
-    inner = [(_pairs(half, half, h), program.v), (_pairs(h / 8, -h / 8, h), program.a)]
+    inner = [(pairs(half, half, h), program.v), (pairs(h / 8, -h / 8, h), program.a)]
     _velocities(program, slice(first, None), inner)
     if first:
         _velocities(program, slice(0, first), [(sp.eye_array(first), program.v)])
@@ -50,21 +55,25 @@ def _velocities(program: Spline, which: slice, parts: list[tuple[Any, Any]]) -> 
     columns = [sp.block_diag(list(-rates / size[:, None, None]))]
     unknowns = [program.w[which].ravel()]
     for form, own in parts:
-        columns.append(sp.kron(sp.diags_array(1 / size) @ form / _unit(program, own), sp.eye_array(program.n)))
+        columns.append(sp.kron(sp.diags_array(1 / size) @ form / program.unit(own), sp.eye_array(program.n)))
         unknowns.append(own.ravel())
     rows = sp.csc_matrix(sp.hstack(columns))
     program.drake.AddLinearEqualityConstraint(rows, np.zeros(rows.shape[0]), np.concatenate(unknowns))
 
 
 def rest(program: Spline) -> None:
-    """No velocity, and where it is asked for no acceleration, at ends that rest; a cycle ends as it began."""
+    """No velocity, and where it is asked for no acceleration, at ends that rest; a cycle without rest ends as it began.
+
+    Of one with rest nothing more is asked: between two of its rounds the arm stands still, and its path, at rest at
+    every knot but these, gives its ends all accelerations that it can give.
+    """
     still = np.zeros(program.n)
     for knot, rests in zip((0, -1), program.problem.rest, strict=True):
         if rests:
             program.drake.AddBoundingBoxConstraint(still, still, program.v[knot])
             if program.problem.zero_acceleration:
                 program.drake.AddBoundingBoxConstraint(still, still, program.a[knot])
-    if not program.closed:
+    if not program.closed or all(program.problem.rest):
         return
     both = np.hstack([np.eye(program.n), -np.eye(program.n)])
     for own, given in ((program.v, any(program.problem.rest)), (program.a, program.problem.zero_acceleration)):
@@ -114,29 +123,33 @@ def limits(program: Spline) -> None:
     if np.isfinite(bounds.lower).any() or np.isfinite(bounds.upper).any():
         places = [
             [(knots, program.y)],
-            [(_pairs(1.0, 0.0, h), program.y), (_pairs(h / 3, 0.0, h), program.v)],
-            [(_pairs(0.0, 1.0, h), program.y), (_pairs(0.0, -h / 3, h), program.v)],
+            [(pairs(1.0, 0.0, h), program.y), (pairs(h / 3, 0.0, h), program.v)],
+            [(pairs(0.0, 1.0, h), program.y), (pairs(0.0, -h / 3, h), program.v)],
         ]
         low, high = (np.broadcast_to(bound, n) for bound in (bounds.lower, bounds.upper))
         for parts in places:
             within(program, parts, low, high, POSITION_SCALE, 0)
     if np.isfinite(bounds.velocity).any():
-        between = [(_pairs(1.0, 0.0, h), program.v), (_pairs(h / 2, 0.0, h), program.a)]
+        between = [(pairs(1.0, 0.0, h), program.v), (pairs(h / 2, 0.0, h), program.a)]
         for parts in ([(knots, program.v)], between):
             within(program, parts, -bounds.velocity, bounds.velocity, program.v_unit, 1)
     if np.isfinite(bounds.acceleration).any():
         within(program, [(knots, program.a)], -bounds.acceleration, bounds.acceleration, program.a_unit, 2)
     if np.isfinite(bounds.jerk).any():
-        jerk = [(_pairs(-1.0, 1.0, h), program.a)]
+        jerk = [(pairs(-1.0, 1.0, h), program.a)]
         room = h[:, None] * np.broadcast_to(bounds.jerk, n)
         within(program, jerk, -room, room, program.a_unit, 3)
 
 
 def within(program: Spline, parts: list[tuple[Any, Any]], low: Array, high: Array, unit: float, order: int) -> None:
-    """low <= the sum of the parts <= high, each (rows, n) or (n,), of a derivative of this order in time."""
+    """low <= the sum of the parts <= high, each (rows, width) or (width,), of a derivative of this order in time.
+
+    Where the motion is stretched and the order is not zero, low is -high.
+    """
     rows, unknowns = _rows(program, parts, unit)
-    count = rows.shape[0] // program.n
-    low, high = ((unit * np.broadcast_to(bound, (count, program.n))).ravel() for bound in (low, high))
+    width = parts[0][1].shape[1]
+    count = rows.shape[0] // width
+    low, high = ((unit * np.broadcast_to(bound, (count, width))).ravel() for bound in (low, high))
     used = np.flatnonzero(np.isfinite(low) | np.isfinite(high))
     rows, low, high = sp.csr_matrix(rows)[used], low[used], high[used]
     if program.stretch is None or order == 0:
@@ -152,7 +165,7 @@ def within(program: Spline, parts: list[tuple[Any, Any]], low: Array, high: Arra
     program.drake.AddConstraint(LinearConstraint(both, free, zero), np.concatenate([unknowns, factor]))
 
 
-def _pairs(before: Any, after: Any, h: Array) -> Any:
+def pairs(before: Any, after: Any, h: Array) -> Any:
     """The sparse form (N, N + 1) of `before` at the first and `after` at the last knot of every interval."""
     count = len(h)
     diagonals = [np.broadcast_to(value, count) for value in (before, after)]
@@ -161,13 +174,8 @@ def _pairs(before: Any, after: Any, h: Array) -> Any:
     return form
 
 
-def _unit(program: Spline, own: Any) -> float:
-    """What one radian (per second) is among these unknowns."""
-    return {id(program.v): program.v_unit, id(program.a): program.a_unit}.get(id(own), POSITION_SCALE)
-
-
 def _rows(program: Spline, parts: list[tuple[Any, Any]], unit: float) -> tuple[Any, Any]:
-    columns = [sp.kron(form * (unit / _unit(program, own)), sp.eye_array(program.n)) for form, own in parts]
+    columns = [sp.kron(form * (unit / program.unit(own)), sp.eye_array(own.shape[1])) for form, own in parts]
     return sp.csc_matrix(sp.hstack(columns)), np.concatenate([own.ravel() for _, own in parts])
 
 

@@ -89,15 +89,17 @@ def tighten(problem: Problem, first: Solved, **options: object) -> tuple[Solved,
     """The optimum that keeps its limits between the knots as well as at them, and all solves after the first.
 
     Where a limit is exceeded in an interval its bounds at both knots are divided by that excess and a little more; from
-    round to round by more of it, since what lies between two knots may give way by less than they do.
+    round to round by more of it, since what lies between two knots may give way by less than they do. Of the shortest
+    motion the time changes with them.
     """
     solved, further, tightened = first, [], Tightened.none(problem, first.curve.times)
     for count in range(ROUNDS):
-        stricter = _stricter(problem, solved.curve, tightened, 1.0 + count)
+        stricter = _stricter(problem, solved.curve.stretched(solved.stretch), tightened, 1.0 + count)
         if stricter is None or not solved.outcome.converged:
             break
         tightened = stricter
-        solved = transcribe(problem, solved.curve, tightened).solve(**options)
+        stretch = 0.0 if solved.program.stretch is None else solved.stretch
+        solved = transcribe(solved.timed(problem), solved.curve, tightened, stretch=stretch).solve(**options)
         further.append(solved)
     return solved, further
 

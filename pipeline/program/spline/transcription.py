@@ -11,7 +11,8 @@ the knots too, since the one is linear there and the other constant; those of ve
 points of each interval, which surround it. Torque, power and clearance hold at the knots: see `tighten.py`.
 
 With `stretch` the motion time is an unknown as well, and what is minimised: the law of the path is kept, and all
-that is written here is of the time as the problem has it. A motion stretched by r has velocities v / r, accelerations
+that is written here is of the time as the problem has it. Where the law is free, its s_i, sd_i, sdd_i are unknowns
+too (`law.py`). A motion stretched by r has velocities v / r, accelerations
 a / r^2 and jerks j / r^3.
 `stretch` is the r that the guess begins with.
 """
@@ -21,10 +22,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from pipeline.problem.problem import Problem
-from pipeline.program.spline import rows, torque
+from pipeline.program.spline import law, rows, torque
 from pipeline.program.spline.curve import Curve
 from pipeline.program.spline.program import Spline, Tightened
-from pipeline.program.terms import clearance, ends, energy, tracking
+from pipeline.program.terms import clearance, ends, energy
 
 Term = Callable[[Spline], None]
 
@@ -33,7 +34,8 @@ COMMON: tuple[Term, ...] = (
     ends.bound,
     rows.rest,
     rows.enter,
-    tracking.follow,
+    law.advance,
+    law.follow,
     torque.lift,
     rows.limits,
     torque.limits,

@@ -20,7 +20,7 @@ from scipy.spatial.transform import Rotation
 from pipeline.common.errors import RobotError
 from pipeline.robot import packages
 from pipeline.robot.formats import plant as drake
-from pipeline.robot.markup import parse
+from pipeline.robot.markup import only, parse
 from pipeline.robot.numbers import SPACE, Vector, number, numbers, shown
 from pipeline.robot.tree import MOMENTS, ZERO, Inertial, Link, Mimic, Tree
 
@@ -28,6 +28,13 @@ KEPT = {
     *("sdf", "world", "model", "link", "joint", "frame", "pose", "parent", "child", "axis", "axis2", "xyz", "include"),
     *("uri", "name", "placement_frame", "static", "use_parent_model_frame", "thread_pitch", "screw_thread_pitch"),
     *("drake:joint", "drake:parent", "drake:child", "drake:axis"),
+}
+# What stands at most once in a link or joint, or in those parts of it.
+ONCE = {
+    **dict.fromkeys(("inertial", "parent", "child", "axis", "pose", "mass", "inertia"), "inertial"),
+    **dict.fromkeys(MOMENTS, "inertial/inertia"),
+    **dict.fromkeys(("xyz", "limit", "mimic"), "axis"),
+    **dict.fromkeys(("lower", "upper", "velocity", "effort"), "axis/limit"),
 }
 DEEPEST = 20  # files within files
 
@@ -99,7 +106,9 @@ def _scoped(
     for child in model:
         called = child.get("name", "") or _text(child, "name")
         if child.tag in ("link", "joint"):
-            _check_poses(child, tree)
+            where = f"robot.urdf = {tree.file}: {child.tag} '{child.get('name')}' has"
+            _refuse_twice(child, where)
+            _check_poses(child, where)
             yield (*scope, called), child
         elif child.tag in ("model", "include"):
             merged = child.get("merge", "false") in ("true", "1")
@@ -140,7 +149,8 @@ def _link(element: ET.Element, name: str, tree: Tree) -> Link:
     elif missing and number(mass.text or "", f"{where} the mass") > 0.0:
         named = "<inertia>" if inertia is None else ", ".join(f"<{key}>" for key in missing)
         link.unknown = f"no {named} in its <inertial>, and SDF's default of 1 kg m^2 is nobody's; state it"
-    moments = tuple(number(stated.get(key) or "0", f"{where} the inertia {key}") for key in MOMENTS)
+    written = {key: "0" if stated.get(key) is None else stated[key] for key in MOMENTS}
+    moments = tuple(number(text or "", f"{where} the inertia {key}") for key, text in written.items())
     place = _pose(inertial.find("pose"), f"{where} in its inertial the pose")
     link.inertial = Inertial(0.0 if mass is None else number(mass.text or "", f"{where} the mass"), *place, moments)
     return link
@@ -160,9 +170,15 @@ def _pose(pose: ET.Element | None, where: str) -> tuple[Vector, Vector]:
     return values[:3], tuple(turn.tolist())
 
 
-def _check_poses(element: ET.Element, tree: Tree) -> None:
+def _refuse_twice(element: ET.Element, where: str) -> None:
+    """Of several elements that say different things Drake would take the first."""
+    for tag, inner in ONCE.items():
+        for holder in [element, *element.iterfind(inner)]:
+            only(holder, tag, where)
+
+
+def _check_poses(element: ET.Element, where: str) -> None:
     """What Drake is to read of a link or joint: its own pose and its axis."""
-    where = f"robot.urdf = {tree.file}: {element.tag} '{element.get('name')}' has"
     _pose(element.find("pose"), f"{where} the pose")
     for axis in element.findall("axis"):
         text = axis.findtext("xyz")

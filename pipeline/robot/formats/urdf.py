@@ -6,6 +6,7 @@ import xml.etree.ElementTree as ET
 from pathlib import Path
 
 from pipeline.common.errors import RobotError
+from pipeline.robot.markup import only
 from pipeline.robot.numbers import Vector, number, numbers, shown
 from pipeline.robot.shapes import link_shapes
 from pipeline.robot.tree import MOMENTS, ZERO, Inertial, Joint, Link, Mimic, Tree
@@ -42,10 +43,10 @@ def _refuse_xacro(root: ET.Element, file: Path) -> None:
 
 
 def _inertial(link: ET.Element, where: str) -> Inertial | None:
-    inertial = _only(link, "inertial", where)
+    inertial = only(link, "inertial", where)
     if inertial is None:
         return None
-    mass, inertia = _only(inertial, "mass", where), _only(inertial, "inertia", where)
+    mass, inertia = only(inertial, "mass", where), only(inertial, "inertia", where)
     moments: Vector = (0.0,) * 6  # a point mass
     if inertia is not None:
         written = {key: inertia.get(key, "" if key in ("ixx", "iyy", "izz") else "0") for key in MOMENTS}
@@ -59,7 +60,7 @@ def _inertial(link: ET.Element, where: str) -> Inertial | None:
 
 
 def _joint(joint: ET.Element, where: str) -> Joint:
-    kind, limit, mimic = joint.get("type", ""), _only(joint, "limit", where), _only(joint, "mimic", where)
+    kind, limit, mimic = joint.get("type", ""), only(joint, "limit", where), only(joint, "mimic", where)
     follows = None
     if mimic is not None:
         factors = (number(mimic.get(key, default), f"{where} in its mimic the {key}")
@@ -81,20 +82,12 @@ def _joint(joint: ET.Element, where: str) -> Joint:
 
 def _vector(element: ET.Element, tag: str, key: str, where: str, absent: str = "0 0 0") -> Vector:
     """The three numbers of <origin xyz>, <origin rpy> or <axis xyz>."""
-    found = _only(element, tag, where)
+    found = only(element, tag, where)
     if found is None:
         return ZERO if absent == "0 0 0" else numbers(absent, 3, "")
     return numbers(found.get(key, absent), 3, f"{where} {tag} the {key}")
 
 
-def _only(element: ET.Element, tag: str, where: str) -> ET.Element | None:
-    """The one element of a tag, or None; raises RobotError for several that say different things."""
-    found = element.findall(tag)
-    if len({ET.tostring(one).strip() for one in found}) > 1:
-        raise RobotError(f"{where} {len(found)} different <{tag}>; one is enough")
-    return found[0] if found else None
-
-
 def _end(joint: ET.Element, end: str, where: str) -> str:
-    found = _only(joint, end, where)
+    found = only(joint, end, where)
     return "" if found is None else found.get("link", "")
