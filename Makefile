@@ -12,7 +12,7 @@ help: ## this list
 run: $(VENV)/.installed ## set up, then run the third trajectory of the PMKE paper
 	$(BIN)/python -m pipeline +experiment=traj3
 
-reproduce: $(VENV)/.installed ## every printed number and figure of the three documents, side by side (outputs/reproduction/)
+reproduce: $(VENV)/.installed ## every printed number and figure of the documents, side by side (outputs/reproduction/)
 	$(BIN)/python -m pipeline.reproduce
 
 test: $(VENV)/.installed-dev ## set up, then run the whole test suite
@@ -37,7 +37,7 @@ cover: $(VENV)/.installed-dev ## which lines the tests do not reach
 schema: $(VENV)/.installed ## write conf/schema.json, by which editors check the files of conf/
 	$(BIN)/python -m pipeline.config
 
-bench: $(VENV)/.installed-dev ## time the solver side by side with CasADi (the tests run it too, small, and judge no times)
+bench: $(VENV)/.installed-dev ## time the solver side by side with CasADi (the tests run it small and judge no times)
 	$(BIN)/python -m tests.benchmarks
 
 package: $(VENV)/.installed-dev ## sdist and wheel, tried in an environment of their own from another folder
@@ -50,7 +50,7 @@ clean: ## remove the environment and all caches, keep outputs/
 	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache .coverage build dist
 
 $(VENV)/bin/python:
-	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or newer is needed, this is " + sys.version.split()[0])'
+	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and f"needs Python 3.11 or newer: {sys.version}")'
 	$(PYTHON) -m venv $(VENV)
 
 $(VENV)/.installed: $(VENV)/bin/python pyproject.toml constraints.txt

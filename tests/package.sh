@@ -1,5 +1,5 @@
 #!/bin/sh
-# Build sdist and wheel, install the wheel (made from the sdist) into a fresh environment, and use it from another folder.
+# Build sdist and wheel, install the wheel (made from the sdist) into a fresh environment, use it from another folder.
 # usage: package.sh PYTHON, from the project's folder
 set -eu
 python=$1
@@ -8,7 +8,8 @@ work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 "$python" -m build --outdir "$work/dist" "$project" >"$work/build.log" 2>&1 || { tail -n 30 "$work/build.log"; exit 1; }
 "$python" -m venv "$work/venv"
-"$work/venv/bin/python" -m pip install --quiet --disable-pip-version-check --constraint "$project/constraints.txt" "$work"/dist/*.whl
+"$work/venv/bin/python" -m pip install --quiet --disable-pip-version-check \
+    --constraint "$project/constraints.txt" "$work"/dist/*.whl
 mkdir "$work/elsewhere"
 cd "$work/elsewhere"
 "$work/venv/bin/python" -m pipeline +experiment=traj3 'methods=[lsv,pmke]' hydra.run.dir=traj3

@@ -118,7 +118,9 @@ class GlobalOptions:
         ),
     ] = None
     nodes: Annotated[Whole, Field(ge=8, le=10_000, description="of the roadmap, in each layer")] = 300
-    layers: Annotated[Whole, Field(ge=2, le=1000, description="of the roadmap, after the first")] = 6
+    layers: Annotated[
+        Whole, Field(ge=2, le=1000, description="of the roadmap, after the first; more in cycles round the base")
+    ] = 6
     configurations: Annotated[
         Whole,
         Field(ge=1, le=MOST_STARTS, description="initial ones by random self-motion (boundaries free and cyclic)"),

@@ -9,7 +9,8 @@ from pipeline.common.errors import ConfigError
 
 MOST_STEPS = 100_000  # every one is evaluated, drawn and recorded
 MOST_SAMPLES = 1_000_000  # every one is simulated, no more
-MOST_EDGES = 10_000_000  # of a roadmap, or places on its paths: each takes some dozens of bytes
+MOST_EDGES = 10_000_000  # of a roadmap: each takes some dozens of bytes
+MOST_PLACES = 1_000_000  # on the paths through every node: as many take ten seconds
 SHORTEST, LONGEST = 1e-6, 1e9  # [s] of a motion
 STEPS = ("dt", "prediction_step", "update_interval")
 
@@ -45,9 +46,12 @@ def _counts(config: Any, duration: float) -> Iterator[tuple[str, float, float, i
 def refuse_endless_roadmap(config: Any) -> None:
     """Raise ConfigError where the roadmap of method.global has too many edges, or too many and long paths."""
     nodes, layers = config.method.of("global").nodes, config.method.of("global").layers
-    size = nodes * layers * max(nodes, layers)
-    if size > MOST_EDGES:
-        raise ConfigError(
-            f"method.global.nodes = {nodes}, method.global.layers = {layers}: nodes x layers x the larger is "
-            f"{size:.3g}; at most {MOST_EDGES:.0e}, to fit into memory"
-        )
+    for factors, size, most, why in (
+        ("nodes x nodes x layers", nodes**2 * layers, MOST_EDGES, "edges, which fit into memory"),
+        ("nodes x layers x layers", nodes * layers**2, MOST_PLACES, "places on its paths, which are compared"),
+    ):
+        if size > most:
+            raise ConfigError(
+                f"method.global.nodes = {nodes}, method.global.layers = {layers}: {factors} is {size:.3g}; at most "
+                f"{most:.0e} {why}"
+            )

@@ -14,6 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.common.arrays import Array
+from pipeline.config.steps import MOST_PLACES
+from pipeline.model.kernel.chain import Chain
+from pipeline.model.kinematics import wrap
 from pipeline.problem.problem import Boundary, Problem
 from pipeline.problem.turns import full_turns
 from pipeline.search.floating import OnMovingBase
@@ -25,6 +28,7 @@ SLACK = 1.15  # times the velocity limits: a coarse step's mean may be a little 
 PRICED = 3  # times as many starts are priced on the first grid as are kept
 APART = 0.1  # [rad]: starts are not closer than half of this
 CLOSED = 1e-6  # [rad]
+TURN = np.deg2rad(20.0)  # of a cycle about the first joint, from layer to layer
 FEW = 4  # nodes of a layer, at most, that a random motion may choose from: with 8 the cheap ones prevail
 
 
@@ -40,7 +44,7 @@ class Roadmap:
         self.problem, self.grid, self.rng = problem, grid, rng
         self.manifold = OnMovingBase(problem) if problem.task.arm.base.count else Manifold(problem)
         self.closed = problem.boundary is Boundary.CYCLIC
-        self.times = np.interp(np.linspace(0, len(grid) - 1, layers + 1), np.arange(len(grid)), grid)
+        self.times = _layers(problem, grid, layers, nodes) if self.closed else _spread(grid, layers)
         self.nodes = _Sampler(self.manifold, self.times, nodes, rng).layers()
         self._more = 1  # times as many nodes of each layer as `random` would need without velocity limits
         self.edges: Edges = []
@@ -115,6 +119,33 @@ class Roadmap:
         wished = np.clip(coarse[:, at] * (1 - share) + coarse[:, at + 1] * share, manifold.lower, manifold.upper)
         motions, arrived = manifold.along(grid, wished)
         return np.asarray(motions[arrived])
+
+
+def _spread(grid: Array, layers: int) -> Array:
+    """The times (layers + 1,) [s] of the layers, as even as the knots `grid`."""
+    return np.interp(np.linspace(0, len(grid) - 1, layers + 1), np.arange(len(grid)), grid)
+
+
+def _layers(problem: Problem, grid: Array, layers: int, nodes: int) -> Array:
+    """The same for a cycle: more layers where it goes round the arm's first joint. Between layers every joint goes the
+    shorter way, and the straight one that is priced; through large turns neither leads along the path.
+    """
+    turns = _turns(problem, grid)
+    if abs(turns.sum()) < np.pi:
+        return _spread(grid, layers)
+    most = max(layers, int(np.sqrt(MOST_PLACES / nodes)))
+    counts = (count for count in range(layers, most) if np.abs(_turns(problem, _spread(grid, count))).max() <= TURN)
+    return _spread(grid, next(counts, most))
+
+
+def _turns(problem: Problem, times: Array) -> Array:
+    """By how much (K,) [rad] the path turns about the axis of the arm's first joint between `times` (K + 1,) [s]."""
+    chain, axes = Chain.of(problem.task.arm), ["xyz".index(axis) for axis in problem.task.axes]
+    frame = chain.turn[0]
+    ray = np.zeros((len(times), 3))
+    ray[:, axes] = problem.reference.position(times)[:, : len(axes)] - chain.shift[0][axes]
+    angle = np.arctan2(ray @ frame[:, 1], ray @ frame[:, 0])
+    return np.asarray(wrap(np.diff(angle), np.array(True)))
 
 
 def edge_costs(manifold: Manifold, times: Array, nodes: list[Array], velocity: Array) -> Edges:

@@ -243,6 +243,7 @@ def test_a_killed_run_goes_on_elsewhere(
 ) -> None:
     """kill -9 of a run on the cluster, started again here: nothing that was finished is solved again."""
     leave_out_pictures(monkeypatch)
+    monkeypatch.chdir(tmp_path)  # robots/ is looked for there first: both runs must find the same file
     sizes = ("configurations=4", "candidates=40", "optimised=6")
     words = ["+experiment=sim1", "timing.steps=14", *(f"method.global.{size}" for size in sizes)]
     there, here = ["parallel=dask", f"parallel.address={two_workers.address}"], ["parallel.workers=1"]

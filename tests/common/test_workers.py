@@ -179,6 +179,7 @@ def test_the_planner_starts_from_what_is_kept(tmp_path: Path) -> None:
 def test_a_killed_run_goes_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
+    monkeypatch.chdir(tmp_path)  # robots/ is looked for there first: both runs must find the same file
     words = [
         *("+experiment=sim1", "timing.steps=26", "parallel.workers=1"),
         *(f"method.global.{key}" for key in ("configurations=4", "candidates=40", "optimised=6")),

@@ -16,7 +16,10 @@ ENDLESS = {
         ["method.global.nodes=10000", "method.global.layers=1000"],
         r"method\.global\.nodes = 10000, method\.global\.layers = 1000: .* is 1e\+11; at most 1e\+07",
     ),
-    "layers": (["method.global.layers=1000"], r"nodes = 300, method\.global\.layers = 1000: .* is 3e\+08"),
+    "layers": (
+        ["method.global.layers=58"],
+        r"nodes = 300, method\.global\.layers = 58: .* is 1\.01e\+06; at most 1e\+06",
+    ),
     "seed": (["seed=100000000000000000000000"], r"seed = .*<= 1"),
     "workers": (["parallel.workers=100000"], r"parallel\.workers = 100000: .*<= 1024"),
 }

@@ -31,7 +31,7 @@ def line() -> Problem:
 
 @pytest.fixture(scope="module")
 def stationary(line: Problem) -> list[Solution]:
-    return calculus_of_variations(line, CalculusOfVariationsOptions())
+    return calculus_of_variations(line, CalculusOfVariationsOptions(spacing=0.06, refinements=2, tolerance=1e-9))
 
 
 @pytest.mark.slow
@@ -105,7 +105,8 @@ def test_neighbours_of_a_minimum_cost_more_and_some_of_a_saddle_less(line: Probl
 
 @pytest.mark.slow
 def test_fixed_start(line: Problem) -> None:
-    motions = calculus_of_variations(replace(line, boundary=Boundary.FIXED), CalculusOfVariationsOptions())
+    options = CalculusOfVariationsOptions(spacing=0.1, refinements=1, tolerance=1e-8, max_speed=4.0)
+    motions = calculus_of_variations(replace(line, boundary=Boundary.FIXED), options)
     best = motions[0]
     assert best.statistics["kind"] == "minimum"
     np.testing.assert_array_equal(best.trajectory.q[0], Q_INIT)

@@ -173,7 +173,8 @@ def test_statistics_tell_how_the_optima_were_found() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["sim1", "sim2", "sim3", "sim4", "sim5", "traj1", "traj2", "traj3", "traj4"])
 def test_both_solvers_find_the_same_optima(name: str) -> None:
-    words = (f"+experiment={name}", "method.global.starts=roadmap", "method.global.optimised=8", "timing.steps=50")
+    few = (f"method.global.{key}" for key in ("starts=roadmap", "nodes=100", "optimised=4"))
+    words = (f"+experiment={name}", *few, "timing.steps=25")
     problem, fast = solved(*words, NEWTON)
     assert fast[0].solution.statistics["solver"] == "newton, confirmed by ipopt"
     _, slow = solved(*words, ALONE)
@@ -273,7 +274,7 @@ def test_too_few_iterations_are_said() -> None:
 @pytest.mark.slow
 def test_a_mixed_objective_lies_between() -> None:
     """Within the limits of sims 2 and 3, the more weight on the torques, the less of them and the more energy."""
-    words = ("+experiment=sim1", "timing.steps=26", "limits=joint", *FEW, "method.global.optimised=6")
+    words = ("+experiment=sim1", "timing.steps=26", "limits=joint", *FEW, "method.global.optimised=3")
     picks = [("objective=kinetic_energy",), ("objective=torque",)]
     for weight in (0.7, 0.3):
         share = ("objective=weighted", f"objective.kinetic_energy={weight}", f"objective.torque={1 - weight}")

@@ -24,14 +24,14 @@ from pipeline.program.transcription import transcribe
 from pipeline.run.main import CONF
 from pipeline.studies import front
 
-FEW = GlobalOptions(configurations=10, candidates=100, optimised=8)
-OPTIONS = ParetoOptions(steps=4, planner=FEW)
+FEW = GlobalOptions(configurations=10, candidates=60, optimised=4)
+OPTIONS = ParetoOptions(steps=3, planner=FEW)
 
 
 @pytest.fixture(scope="module")
 def problem() -> Problem:
     with initialize_config_dir(CONF, version_base="1.3"):
-        return prepare(checked(compose("config", overrides=["+experiment=pareto", "timing.steps=26"])))
+        return prepare(checked(compose("config", overrides=["+experiment=pareto", "timing.steps=18"])))
 
 
 @pytest.fixture(scope="module")

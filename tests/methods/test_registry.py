@@ -20,11 +20,14 @@ from pipeline.run.solve import solve
 from pipeline.run.state import state
 from tests.support import composed
 
-FEW = ("configurations=4", "candidates=30", "optimised=1", "same_path=0.5", "refine_to=null")
+FEW = (
+    *("configurations=4", "candidates=30", "optimised=1", "same_path=0.5", "refine_to=null"),
+    *("nodes=40", "layers=3"),
+)
 SMALL = (
     *(f"method.global.{word}" for word in FEW),
     *(
-        "timing.steps=12",
+        "timing.steps=8",
         "path.length=0.15",
         "timing.duration=4",
         "method.lsv.dt=0.1",
@@ -42,15 +45,18 @@ SMALL = (
     *("method.calculus_of_variations.spacing=0.3", "method.calculus_of_variations.refinements=1"),
     *(
         "method.calculus_of_variations.max_speed=0.5",
+        "method.calculus_of_variations.scan_tolerance=1e-4",
+        "method.calculus_of_variations.tolerance=1e-7",
         "method.pontryagin.guesses=2",
         "method.pontryagin.intervals=10",
+        "method.pontryagin.tolerance=1e-7",
     ),
 )
 CIRCLE = tuple(word for word in SMALL if not word.startswith("path."))
 PROBLEMS = {
     "fixed": SMALL,
     "free": (*SMALL, "boundary=free"),
-    "cyclic": (*CIRCLE, "path=circle", "path.radius=0.03", "boundary=cyclic"),
+    "cyclic": (*CIRCLE, "path=circle", "path.radius=0.03", "boundary=cyclic", "timing.steps=12"),
     "limits": (*SMALL, "limits=joint"),
     "torque": (*SMALL, "objective=torque"),
     "floating": (*SMALL, "base=free", "base.mass=20", "base.inertia=1"),
@@ -61,7 +67,7 @@ PROBLEMS = {
         "method.receding.objective=kinetic_energy",
         "method.pareto.objectives=[reaction_force,torque]",
     ),
-    "r = 2": (*SMALL, "robot=planar4r"),
+    "r = 2": (*SMALL, "robot=planar4r", "timing.steps=12"),
 }
 BASELINES = {"lsv", "inertia_weighted", "pmke", "receding", "global", "pareto"}
 SERVED = {
@@ -82,7 +88,7 @@ WHY = {  # a word of the refusal, where the problem's name is none
 
 
 def asked(problem: str, method: str) -> RunConfig:
-    return composed(*PROBLEMS[problem], f"methods=[{method}]")
+    return replace(composed(*PROBLEMS[problem]), methods=(method,))  # composed once for all methods
 
 
 @pytest.mark.parametrize(("name", "problem"), [(m, p) for p in PROBLEMS for m in METHODS if m not in SERVED[p]])

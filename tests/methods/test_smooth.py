@@ -114,10 +114,10 @@ def test_simulation_3_and_4_from_rest_to_rest() -> None:
     """Simulation 3 costs .1090 then, and 4 has no motion within its limits below 1.005 s (CasADi; `sending`)."""
     rest = ("boundary.rest=[start,end]", "timing.steps=50", "method.global.solver=newton")
     third = prepare(composed("+experiment=sim3", *rest))
-    best = evaluate(third, global_planner(third, FEW)[0])
+    best = evaluate(third, global_planner(third, replace(FEW, optimised=1))[0])
     assert best.integral("torque") == pytest.approx(0.1090, rel=5e-3)
     fourth = prepare(composed("+experiment=sim4", *rest))
-    (answer,) = global_planner(fourth, FEW)
+    (answer,) = global_planner(fourth, replace(FEW, optimised=1))
     shortest = float(answer.message.split("shortest feasible duration ")[1].split()[0])
     assert shortest == pytest.approx(1.005, rel=3e-3)
     assert "cannot be met" in answer.message

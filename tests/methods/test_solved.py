@@ -14,7 +14,12 @@ from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Status
 from tests.support import composed
 
-QUICK = ("method.global.optimised=3", "method.global.nodes=40", "method.pareto.steps=2", "method.pareto.rounds=1")
+QUICK = (
+    *("method.global.optimised=1", "method.global.nodes=40", "method.pareto.steps=2", "method.pareto.rounds=1"),
+    *("method.lsv.dt=0.02", "method.inertia_weighted.dt=0.02"),
+    *("method.pontryagin.guesses=2", "method.pontryagin.tolerance=1e-7"),
+    *("method.calculus_of_variations.spacing=0.2", "method.calculus_of_variations.tolerance=1e-8"),
+)
 SHORT = (*QUICK, "path.length=0.2", "timing.duration=2", "timing.steps=12")
 CIRCLE = (*QUICK, "path=circle", "path.angle=720", "timing.duration=2", "timing.steps=12")
 FLOATING = (*SHORT, "method.global.candidates=8", "robot=planar3r_base", "base=free")

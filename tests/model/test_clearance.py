@@ -112,7 +112,7 @@ def test_an_obstacle_on_the_path_is_named() -> None:
         "timing.duration=2",
         "timing.steps=12",
         *FEW_STARTS,
-        "method.global.optimised=4",
+        "method.global.optimised=1",
         "+obstacles.shapes.wall={kind: box, center: [0.563, 0.24, 0.0], size: [0.04, 0.04, 0.1]}",
         "obstacles.margin=0.01",
     )

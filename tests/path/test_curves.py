@@ -89,10 +89,13 @@ def planar_points() -> st.SearchStrategy[Array]:
 def test_spline_passes_through_its_points_at_the_right_arc_length(points: Array) -> None:
     spline = Spline(points)
     assert spline.length >= np.linalg.norm(np.diff(points, axis=0), axis=1).sum() * (1 - 1e-12)
-    fine = spline.sample(np.linspace(0.0, spline.length, 20001))[0]
+    step = spline.length / 20000
+    fine, _, curvature = spline.sample(np.linspace(0.0, spline.length, 20001))
     pieces = np.linalg.norm(np.diff(fine, axis=0), axis=1)
-    assert pieces.sum() == pytest.approx(spline.length, rel=1e-6)
-    assert np.ptp(pieces) <= 1e-4 * pieces.mean() + 1e-12 or pieces.max() <= spline.length / 20000 * (1 + 1e-9)
+    assert pieces.max() <= step * (1 + 1e-4)  # where it all but turns on the spot its length is known less well
+    # A chord is never longer than its arc, and shorter by (curvature ds)^2 / 24 of it.
+    shorter = (np.linalg.norm(curvature, axis=1) ** 2).sum() * step**3 / 24
+    assert -1e-6 * spline.length <= spline.length - pieces.sum() <= 2 * shorter + 1e-6 * spline.length
     reached = [np.linalg.norm(fine - point, axis=1).min() for point in points]
     assert max(reached) <= spline.length / 20000
     np.testing.assert_allclose(fine[[0, -1]], points[[0, -1]], atol=1e-12)

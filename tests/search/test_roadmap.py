@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
 
 from pipeline.build.problem import prepare
+from pipeline.config.methods import GlobalOptions
+from pipeline.evaluation.evaluation import evaluate
+from pipeline.methods.global_planner.planner import global_planner
 from pipeline.problem.costs import objective_values
 from pipeline.search.layers import closed_paths, through_every_node
 from pipeline.search.manifold import Manifold
 from pipeline.search.roadmap import Roadmap, edge_costs
+from pipeline.search.self_motion import manifold
 from tests.support import composed
 
 
@@ -95,3 +100,33 @@ def test_a_stretched_start_is_left_on_both_sides() -> None:
     motions = Roadmap(problem, problem.times, np.random.default_rng(1)).cheapest(64)
     assert (motions[:, 1] @ [0, 0, 1] > 0).any()
     assert (motions[:, 1] @ [0, 0, 1] < 0).any()
+
+
+AROUND = ("boundary=cyclic", "path=circle", "path.start=[0.15,0]", "path.radius=0.15", "robot.q_init=null")
+
+
+@pytest.mark.parametrize(("radius", "layers"), [(0.15, range(30, 60)), (0.07, [6])])
+def test_a_cycle_round_the_base_has_layers_that_show_its_turns(radius: float, layers: Sequence[int]) -> None:
+    """Round the base two layers are at most 20 degrees apart; a circle beside it has as many as ever."""
+    problem = prepare(composed(*AROUND, f"path.radius={radius}", "timing.steps=25"))
+    times = Roadmap(problem, problem.times, np.random.default_rng(3), nodes=8).times
+    assert len(times) - 1 in layers
+    x, y = problem.reference.position(times).T
+    assert radius == 0.07 or np.abs(np.diff(np.unwrap(np.arctan2(y, x)))).max() < np.deg2rad(20.01)
+
+
+@pytest.mark.slow
+def test_a_cycle_round_the_base_costs_no_more_than_turning_the_whole_arm() -> None:
+    """The first joint alone, in the shape whose inertia about it is least: an upper bound that needs no planner."""
+    problem = prepare(composed(*AROUND, "timing.steps=25"))
+    rng = np.random.default_rng(3)
+    shapes = np.concatenate(
+        [loop.q for loop in manifold(problem.task, problem.reference.position(np.zeros(1))[0], rng)]
+    )
+    inertia = problem.task.arm.mass_matrix(shapes)[:, 0, 0].min()
+    x, y = problem.reference.position(problem.times).T
+    turned = np.diff(np.unwrap(np.arctan2(y, x)))
+    assert abs(turned.sum()) == pytest.approx(2 * np.pi)
+    found = global_planner(problem, GlobalOptions(nodes=100, optimised=8, budget=8))
+    best = min(evaluate(problem, one).objective for one in found if one.found)
+    assert best <= 0.5 * inertia * (turned**2 / np.diff(problem.times)).sum() * (1 + 1e-9)

@@ -23,7 +23,6 @@ from pipeline.common.arrays import Array
 from pipeline.config.methods import CalculusOfVariationsOptions
 from pipeline.methods.calculus_of_variations.extremals import MOST_STEPS, initial_state, integrate
 from pipeline.methods.method import Context, Method, Serves
-from pipeline.model.kernel.arm import on_kernel
 from pipeline.model.kinematics import wrap
 from pipeline.problem.lagrangian import Lagrangian
 from pipeline.problem.problem import Boundary, Problem
@@ -67,7 +66,7 @@ def solve(problem: Problem, options: CalculusOfVariationsOptions, context: Conte
     `integral`, the objective in continuous time, `kind` (minimum or saddle), `index`, `unknown` [rad or rad/s] and
     `residual` t' M qd at T.
     """
-    problem = replace(problem, times=on_path(problem), task=on_kernel(problem.task))
+    problem = replace(problem, times=on_path(problem))
     found: list[tuple[_Family, float]] = []
     near: list[tuple[float, float]] = []
     families = _families(problem, options)

@@ -1,4 +1,4 @@
-"""An arm whose kinematics and first-order dynamics come from the kernel: for methods that ask for many knots at once."""
+"""An arm whose kinematics and first-order dynamics are the kernel's: for methods that need many knots at once."""
 
 from __future__ import annotations
 
