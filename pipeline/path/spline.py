@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from pipeline.common.arrays import Array
@@ -16,13 +17,15 @@ CUSP = 0.02  # of the chords' speed: where a curve is slower than that it turns 
 
 
 class Spline:
-    """A cubic spline (C2) through `points` (P, m) [m], by arc length; `first` is its number in messages."""
+    """A cubic spline (C2) through `points` (P, m) [m], by arc length. before (P - 1,): the number of the
+    way-point before each chord, for messages; None: from 1 on.
+    """
 
-    def __init__(self, points: Array, first: int = 1) -> None:
+    def __init__(self, points: Array, before: NDArray[np.int_] | None = None) -> None:
         chord = np.linalg.norm(np.diff(points, axis=0), axis=1)
         knots = np.concatenate([[0.0], np.cumsum(chord)])
         self._curve = CubicSpline(knots, points) if len(points) > 2 else CubicSpline(knots, points, bc_type="natural")
-        self._require_smooth(knots, first)
+        self._require_smooth(knots, np.arange(1, len(points)) if before is None else before)
         # Arc length by 8-point Gauss-Legendre on short pieces, then its inverse by Newton from a linear guess.
         nodes, weights = np.polynomial.legendre.leggauss(8)
         self._u = np.linspace(0.0, knots[-1], max(4, min(PIECES, MOST_PIECES // len(points))) * len(points))
@@ -34,13 +37,13 @@ class Spline:
         self.length = float(self._s[-1])
         self.marks = self._arc(knots)  # (P,) [m] where along the curve the points lie
 
-    def _require_smooth(self, knots: Array, first: int) -> None:
+    def _require_smooth(self, knots: Array, before: NDArray[np.int_]) -> None:
         """Raise PathError where the curve all but stops: by arc length it would turn on the spot, at full speed."""
         inner = (knots[:-1, None] + np.diff(knots)[:, None] * np.linspace(0.0, 1.0, 17)[:-1]).ravel()
         speed = np.linalg.norm(self._curve(inner, 1), axis=1)
         slowest = int(np.argmin(speed))
         if speed[slowest] < CUSP:
-            chord = slowest // 16 + first
+            chord = int(before[slowest // 16])
             raise PathError(
                 f"path: the smooth curve turns back on itself between way-points {chord} and {chord + 1}; give more "
                 "way-points there, or path.corners=rest"

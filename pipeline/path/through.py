@@ -52,7 +52,7 @@ def through(points: Array, rotations: Rotation | None, *, rest: bool = False) ->
     for first, last in pairwise(breaks):
         part = slice(first, last + 1)
         if moves[first] > SAME:
-            piece: Geometry = (spline := Spline(own[part], int(kept[first]) + 1))
+            piece: Geometry = (spline := Spline(own[part], kept[first + 1 : last + 1]))
             local = spline.marks
         else:
             local = TURN * np.concatenate([[0.0], np.cumsum(turns[first:last])])
@@ -95,4 +95,4 @@ def _departure(geometry: Geometry, points: Array, marks: Array, kept: Array) -> 
     nearest = start + np.clip(along, 0.0, 1.0)[:, :, None] * chord
     distance = np.linalg.norm(curve - nearest, axis=2).max(axis=1)
     worst = int(np.argmax(distance))
-    return float(distance[worst]), int(kept[worst]) + 1
+    return float(distance[worst]), int(kept[worst + 1])  # past a dwell
