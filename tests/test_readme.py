@@ -18,7 +18,7 @@ from pipeline.run.state import state
 ROOT = Path(__file__).resolve().parent.parent
 GUIDES = [str(file.relative_to(ROOT)) for file in sorted((ROOT / "docs" / "guide").glob("*.md"))]
 NAMES = ["README.md", "docs/errata.md", "docs/tour.md", *GUIDES]
-TEXTS = {name: (ROOT / name).read_text(encoding="utf-8") for name in NAMES}
+TEXTS = {name: re.sub(r"\\\n\s*", "", (ROOT / name).read_text(encoding="utf-8")) for name in NAMES}
 QUESTIONS = (" --help", " -sc ")
 COMMANDS = sorted(
     {

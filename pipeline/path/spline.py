@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from pipeline.common.arrays import Array
@@ -67,23 +68,25 @@ class ByLength:
 
 
 class Spline(ByLength):
-    """A cubic spline (C2) through `points` (P, m) [m], by arc length; `first` is its number in messages."""
+    """A cubic spline (C2) through `points` (P, m) [m], by arc length. before (P - 1,): the number of the
+    way-point before each chord, for messages; None: from 1 on.
+    """
 
-    def __init__(self, points: Array, first: int = 1) -> None:
+    def __init__(self, points: Array, before: NDArray[np.int_] | None = None) -> None:
         chord = np.linalg.norm(np.diff(points, axis=0), axis=1)
         knots = np.concatenate([[0.0], np.cumsum(chord)])
         curve = CubicSpline(knots, points) if len(points) > 2 else CubicSpline(knots, points, bc_type="natural")
-        _require_smooth(curve, knots, first)
+        _require_smooth(curve, knots, np.arange(1, len(points)) if before is None else before)
         super().__init__(curve, knots, knots)
 
 
-def _require_smooth(curve: CubicSpline, knots: Array, first: int) -> None:
+def _require_smooth(curve: CubicSpline, knots: Array, before: NDArray[np.int_]) -> None:
     """Raise PathError where the curve all but stops: by arc length it would turn on the spot, at full speed."""
     inner = (knots[:-1, None] + np.diff(knots)[:, None] * np.linspace(0.0, 1.0, 17)[:-1]).ravel()
     speed = np.linalg.norm(curve(inner, 1), axis=1)
     slowest = int(np.argmin(speed))
     if speed[slowest] < CUSP:
-        chord = slowest // 16 + first
+        chord = int(before[slowest // 16])
         raise PathError(
             f"path: the smooth curve turns back on itself between way-points {chord} and {chord + 1}; give more "
             "way-points there, or path.corners=stop"

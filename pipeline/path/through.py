@@ -58,7 +58,7 @@ def through(points: Array, rotations: Rotation | None, *, rest: bool = False, bl
         if moves[first] > SAME:
             curve: ByLength
             if blend is None:
-                curve = Spline(own[part], int(kept[first]) + 1)
+                curve = Spline(own[part], kept[first + 1 : last + 1])
             else:
                 curve = Blended(own[part], blend)
                 closer += [int(kept[first + i]) for i in curve.closer]

@@ -11,7 +11,7 @@ from types import FrameType
 
 CODE = 128 + signal.SIGTERM
 SOON = 0.02  # [s] until it is tried again, where it cannot be raised
-GRACE = 1.5  # [s] to leave in order; workers leave by themselves when this process is gone
+GRACE = 1.0  # [s] to leave in order; workers leave by themselves when this process is gone
 
 
 class Terminated(BaseException):

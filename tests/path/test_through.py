@@ -25,6 +25,19 @@ def test_a_smooth_curve_says_how_far_it_leaves_its_polygon() -> None:
     assert found.departure[0] == pytest.approx(off, rel=2e-3)
     assert found.stops == ()
     assert found.departure[1] in (1, 4)  # as far in the first and in the last
+    assert through(np.vstack([SQUARE[:1], SQUARE]), None).departure[1] in (2, 5)  # after a dwell
+
+
+def test_a_curve_that_swings_over_an_end_leaves_the_polygon_there() -> None:
+    """Held against the chord itself, point by point: beyond its end the line that it lies on is nearer."""
+    points = np.array([[0.0, 0.0], [0.1, 0.0], [0.02, 0.03]])
+    found = through(points, None)
+    worst = 0.0
+    for i in range(2):
+        x = found.geometry.sample(np.linspace(found.marks[i], found.marks[i + 1], 33))[0]
+        chord = points[i] + np.linspace(0.0, 1.0, 2001)[:, None] * (points[i + 1] - points[i])
+        worst = max(worst, np.linalg.norm(x[:, None] - chord, axis=2).min(axis=1).max())
+    assert found.departure[0] == pytest.approx(worst, rel=1e-3)
 
 
 def test_corners_at_rest_are_straight() -> None:
@@ -86,4 +99,6 @@ def test_a_curve_that_turns_on_the_spot_is_refused() -> None:
     points = np.array([[0.3, 0.8], [0.2, 0.4], [0.7, 0.9], [0.8, 0.1], [0.9, 0.8]])
     with pytest.raises(PathError, match="turns back on itself between way-points 4 and 5"):
         through(points, None)
+    with pytest.raises(PathError, match="between way-points 5 and 6"):  # as the file has them
+        through(np.vstack([points[:1], points]), None)
     assert through(points, None, rest=True).stops == (1, 2, 3)

@@ -36,6 +36,14 @@ def test_time_stamps_are_met_without_running_backwards(rows: tuple[Array, Array]
     _is_the_derivative(law, t)
 
 
+def test_time_stamps_rest_at_stops() -> None:
+    """Which could be passed at speed, as they are without them."""
+    times, fractions = (0.0, 1.0, 2.0, 3.0), (0.0, 0.3, 0.7, 1.0)
+    assert Stamped(times, fractions).sample(np.array([1.0, 2.0]), 2.0)[1].min() > 0.5
+    np.testing.assert_allclose(Stamped(times, fractions, (1,)).sample(np.array([1.0]), 2.0)[1], 0.0, atol=1e-12)
+    assert Stamped(times, fractions, (1,)).sample(np.array([2.0]), 2.0)[1] > 0.5
+
+
 @given(st.sampled_from([RaisedCosine, Quintic]), st.lists(st.floats(0.05, 0.95), min_size=1, max_size=4, unique=True))
 def test_a_law_with_stops_rests_there_and_shares_its_time_by_length(law: type[Timing], stops: list[float]) -> None:
     stops = [stop for i, stop in enumerate(sorted(stops)) if i == 0 or stop - sorted(stops)[i - 1] > 0.01]
