@@ -26,7 +26,7 @@ from pipeline.robot.urdf import check_root, root_mass
 def place(problem: Problem, config: RunConfig) -> Problem:
     """The problem on the base that `config` asks for; raises ConfigError if they do not go together."""
     wanted = {key for key, weight in config.objective.weights.items() if weight}
-    wanted |= set(config.method.pareto.objectives) if "pareto" in config.methods else set()
+    wanted |= set(config.method.pareto.objectives) - {"duration"} if "pareto" in config.methods else set()
     bases = {INTEGRALS[name].base for name in wanted}
     free = isinstance(config.base, FreeBaseConfig)
     if "floating" in bases and not free:

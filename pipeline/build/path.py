@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
@@ -23,7 +23,9 @@ from pipeline.path.reference import Reference
 from pipeline.path.through import SAME, TURN, Through, steps, through
 from pipeline.path.timing import ConstantSpeed, Cruise, Quintic, RaisedCosine, Stamped, Timing, WithStops
 from pipeline.path.waypoints import Waypoints, read, same_point
+from pipeline.robot.packages import find
 
+UNITS = {"m": 1.0, "mm": 1e-3}
 NEGLIGIBLE = 1e-9  # of the length: a departure from the polygon below it is rounding
 
 TIMINGS: dict[str, Callable[[float], Timing]] = {
@@ -80,8 +82,10 @@ def make_reference(path: Any, timing: TimingConfig, task: Task, q_init: Array) -
         )
     if isinstance(path, WaypointsConfig):
         rows = _read(path, timing, task)
-        points = rows.points + here[:count] - rows.points[0] if path.relative else rows.points
-        found = through(points, rows.rotations, rest=path.corners == "rest")
+        given_points = rows.points * UNITS[path.units]
+        points = given_points + here[:count] - given_points[0] if path.relative else given_points
+        blend = path.blend if path.corners == "blend" else None
+        found = through(points, rows.rotations, rest=path.corners == "stop", blend=blend)
         geometry, orientation = found.geometry, found.orientation
         law, notes = _law(path, timing, found, rows.times), _notes(path, found)
     else:
@@ -134,7 +138,7 @@ def _read(path: WaypointsConfig, timing: TimingConfig, task: Task) -> Waypoints:
     """The rows of path.file, all of whose columns serve."""
     if path.file in ("", "???"):
         raise ConfigError("path.file: not given; the way-points are rows of a CSV file, e.g. path.file=points.csv")
-    rows, where = read(path.file, task.axes), f"path.file = {path.file}"
+    rows, where = read(find(path.file, "path.file"), task.axes), f"path.file = {path.file}"
     if rows.rotations is not None and isinstance(task, PositionTask):
         raise ConfigError(
             f"{where} has orientations, and the task prescribes none; set robot.orientation to full or pointing, or "
@@ -183,12 +187,24 @@ def _notes(path: WaypointsConfig, found: Through) -> tuple[str, ...]:
     notes = []
     distance, before = found.departure
     if distance > NEGLIGIBLE * found.geometry.length:
+        ways = {
+            "spline": "; path.corners=blend goes straight and rounds the corners, path.corners=stop stops at them",
+            "blend": "",
+        }
         notes.append(
             f"the smooth curve leaves the polygon of its way-points by up to {distance:.3g} m, between way-points "
-            f"{before} and {before + 1}; path.corners=rest goes straight, with a stop at each"
+            f"{before} and {before + 1}{ways.get(path.corners, '')}"
         )
+    elif path.corners == "stop":
+        notes.append("the path keeps to the polygon of its way-points")
+    if found.closer:
+        notes.append(f"{_listed(found.closer)} lie too close to the next for path.blend: the path keeps closer to them")
     if found.stops:
-        shown_ones = ", ".join(str(i + 1) for i in found.stops[:8]) + ", ..." * (len(found.stops) > 8)
-        why = "" if path.corners == "rest" else ", where it turns back or on the spot"
-        notes.append(f"the path comes to rest at way-point{'s' * (len(found.stops) > 1)} {shown_ones}{why}")
+        why = "" if path.corners == "stop" else ", where it turns back or on the spot"
+        notes.append(f"the path comes to rest at {_listed(found.stops)}{why}")
     return tuple(notes)
+
+
+def _listed(which: Sequence[int]) -> str:
+    shown_ones = ", ".join(str(i + 1) for i in which[:8]) + ", ..." * (len(which) > 8)
+    return f"way-point{'s' * (len(which) > 1)} {shown_ones}"

@@ -90,10 +90,15 @@ class WaypointsConfig(PathConfig):
         Text, Field(description="CSV file with header x,y or x,y,z, in m; orientations and times beside")
     ] = ""
     relative: Annotated[Switch, Field(description="shift the curve so that it starts at the end effector")] = False
+    units: Annotated[Literal["m", "mm"], Field(description="of the points in the file")] = "m"
     corners: Annotated[
-        Literal["smooth", "rest"],
-        Field(description="rest: straight from one way-point to the next, with a stop at each"),
-    ] = "smooth"
+        Literal["spline", "blend", "stop"],
+        Field(
+            description="spline: a smooth curve through all way-points; blend: straight with rounded corners; stop: "
+            "straight, with a stop at each way-point"
+        ),
+    ] = "spline"
+    blend: Annotated[Number, Field(gt=0, description="[m] how far corners that blend may be left, at most")] = 0.005
 
 
 @schema

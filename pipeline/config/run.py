@@ -15,7 +15,7 @@ from pipeline.config.goal import BoundaryConfig, KineticEnergyConfig, LimitsConf
 from pipeline.config.methods import MethodConfig, MethodName
 from pipeline.config.path import CircleConfig, LineConfig, TimingConfig, WaypointsConfig
 from pipeline.config.robot import FixedBaseConfig, FreeBaseConfig, ObstaclesConfig, RobotConfig
-from pipeline.config.steps import refuse_endless, refuse_endless_roadmap
+from pipeline.config.steps import refuse_endless, refuse_endless_search
 from pipeline.config.studies import (
     CandidateStudyConfig,
     ClosedLoopConfig,
@@ -84,7 +84,7 @@ class RunConfig:
 def check(values: Mapping[str, Any]) -> RunConfig:
     """The checked configuration of one run; raises ConfigError naming the key and what is allowed."""
     config = build(RunConfig, values)
-    refuse_endless_roadmap(config)
+    refuse_endless_search(config)
     if config.timing.law != "from_file" and isinstance(config.timing.duration, float):
         refuse_endless(config, config.timing.duration)
     return config

@@ -18,10 +18,11 @@ from scipy.spatial.distance import squareform
 
 from pipeline.common.arrays import Array
 from pipeline.config.methods import ParetoOptions
+from pipeline.methods import duration_front
 from pipeline.methods.global_planner.grids import finer
 from pipeline.methods.global_planner.optimum import stays_on_path
 from pipeline.methods.global_planner.planner import TRACKING, global_planner
-from pipeline.methods.method import ON_KNOTS, Context, Method
+from pipeline.methods.method import ON_KNOTS, WITH_TIMING, Context, Method
 from pipeline.problem.costs import integrals
 from pipeline.problem.limits import LIMIT_KINDS
 from pipeline.problem.objective import Objective
@@ -70,6 +71,8 @@ def solve(problem: Problem, options: ParetoOptions, context: Context) -> list[So
     """The front's motions, from one extreme to the other, on the planner's knots or finer ones where one of them would
     leave its path. The first's statistics hold `front`, a row per point.
     """
+    if duration_front.DURATION in options.objectives:
+        return duration_front.solve(problem, options, context)
     while True:
         solutions = _front(problem, options, context)
         time = solutions[0].trajectory.time
@@ -127,11 +130,15 @@ def refuses(problem: Problem, options: ParetoOptions) -> str | None:
     """Two integrals make a front, and the planner must serve each of them."""
     if len(options.objectives) != 2:
         return f"method.pareto.objectives = [{', '.join(options.objectives)}]: a front is one of two integrals"
+    if duration_front.DURATION in options.objectives:
+        return duration_front.refuses(problem, options)
+    if why := ON_KNOTS.why_not(problem):
+        return why
     each = (replace(problem, objective=Objective({name: 1.0})) for name in options.objectives)
     return next((why for own in each if (why := global_planner.why_not(own, options.planner))), None)
 
 
-pareto = Method("pareto", "Pareto point", "#2F855A", ParetoOptions, ON_KNOTS, solve, refuses)
+pareto = Method("pareto", "Pareto point", "#2F855A", ParetoOptions, WITH_TIMING, solve, refuses)
 
 
 def _points(options: ParetoOptions, best: Array, worst: Array) -> list[Point]:

@@ -9,9 +9,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from pipeline.common.arrays import Array
+from pipeline.path.blend import Blended
 from pipeline.path.curves import Geometry, Still
 from pipeline.path.orientation import Orientation
-from pipeline.path.spline import Chain, Sampled, Spline
+from pipeline.path.spline import ByLength, Chain, Sampled, Spline
 
 TURN = 0.1  # [m/rad] what a turn on the spot counts of the path's length
 SAME = 1e-12  # [m] and [rad]: below it nothing moves
@@ -25,6 +26,7 @@ class Through:
 
     stops: indices of way-points between the first and the last at which the path comes to rest.
     departure: the largest distance [m] of the curve from the way-points' polygon, and the way-point before it, from 1.
+    closer: indices of the corners whose legs are too short for the blend asked for.
     """
 
     geometry: Geometry
@@ -32,13 +34,15 @@ class Through:
     marks: Array
     stops: tuple[int, ...]
     departure: tuple[float, int]
+    closer: tuple[int, ...] = ()
 
 
-def through(points: Array, rotations: Rotation | None, *, rest: bool = False) -> Through:
+def through(points: Array, rotations: Rotation | None, *, rest: bool = False, blend: float | None = None) -> Through:
     """The path through points (P, m) [m] and rotations (P); equal neighbours are a dwell, of length zero.
 
     It comes to rest where it turns back, before and after it turns on the spot, and with `rest` at every corner, so
-    that it is straight in between; elsewhere it is smooth.
+    that it is straight in between. Elsewhere it is smooth: a spline, or with `blend` [m] straight legs whose
+    corners are rounded, at most so far off them.
     """
     moves, turns = steps(points, rotations)
     kept = np.concatenate([[0], 1 + np.flatnonzero((moves > SAME) | (turns > SAME))])
@@ -48,12 +52,18 @@ def through(points: Array, rotations: Rotation | None, *, rest: bool = False) ->
     breaks = [0, *(i for i in range(1, len(own) - 1) if rest or _stops(own, moves, i)), len(own) - 1]
     pieces: list[Geometry] = []
     oriented: list[Sampled] = []
-    marks, ends = np.zeros(len(own)), [0.0]
+    marks, ends, closer = np.zeros(len(own)), [0.0], list[int]()
     for first, last in pairwise(breaks):
         part = slice(first, last + 1)
         if moves[first] > SAME:
-            piece: Geometry = (spline := Spline(own[part], int(kept[first]) + 1))
-            local = spline.marks
+            curve: ByLength
+            if blend is None:
+                curve = Spline(own[part], int(kept[first]) + 1)
+            else:
+                curve = Blended(own[part], blend)
+                closer += [int(kept[first + i]) for i in curve.closer]
+            piece: Geometry = curve
+            local = curve.marks
         else:
             local = TURN * np.concatenate([[0.0], np.cumsum(turns[first:last])])
             piece = Still(own[first], float(local[-1]))
@@ -66,7 +76,14 @@ def through(points: Array, rotations: Rotation | None, *, rest: bool = False) ->
     geometry = Chain(pieces, np.array(ends)) if whole else pieces[0]
     orientation = None if turned is None else Chain(oriented, np.array(ends)) if whole else oriented[0]
     resting = {int(i) for i in np.flatnonzero(np.isin(where, breaks[1:-1]))}
-    return Through(geometry, orientation, marks[where], tuple(sorted(resting)), _departure(geometry, own, marks, kept))
+    return Through(
+        geometry,
+        orientation,
+        marks[where],
+        tuple(sorted(resting)),
+        _departure(geometry, own, marks, kept),
+        tuple(closer),
+    )
 
 
 def steps(points: Array, rotations: Rotation | None) -> tuple[Array, Array]:

@@ -27,7 +27,7 @@ def inputs(config: RunConfig) -> dict[str, str]:
     files = {"robot.urdf": robot}
     files |= {f"robot.urdf: {name}": file for name, file in formats.files(robot).items() if file != robot}
     if isinstance(config.path, WaypointsConfig):
-        files["path.file"] = Path(config.path.file)
+        files["path.file"] = find(config.path.file, "path.file")
     if config.limits.file is not None:
         files["limits.file"] = find(config.limits.file, "limits.file")
     if config.identification.run:

@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from types import FrameType
 
 CODE = 128 + signal.SIGTERM
+SOON = 0.02  # [s] until it is tried again, where it cannot be raised
 GRACE = 1.5  # [s] to leave in order; workers leave by themselves when this process is gone
 
 
@@ -24,11 +25,18 @@ def terminable() -> Iterator[None]:
         yield
         return
 
-    def leave(_: int, __: FrameType | None) -> None:
+    def leave(number: int, frame: FrameType | None) -> None:
         signal.signal(signal.SIGTERM, signal.SIG_IGN)  # once is enough
         last = threading.Timer(GRACE, os._exit, [CODE])
         last.daemon = True
         last.start()
+        go(number, frame)
+
+    def go(_: int, frame: FrameType | None) -> None:
+        if _loads(frame):
+            signal.signal(signal.SIGALRM, go)
+            signal.setitimer(signal.ITIMER_REAL, SOON)
+            return
         raise Terminated
 
     before = signal.signal(signal.SIGTERM, leave)
@@ -40,9 +48,19 @@ def terminable() -> Iterator[None]:
     finally:
         if signal.getsignal(signal.SIGTERM) is leave:
             signal.signal(signal.SIGTERM, before)
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
 
 
 def insist() -> None:
     """Raise Terminated again where a library has made another error of it: compiled modules do, while they load."""
     if signal.getsignal(signal.SIGTERM) is signal.SIG_IGN:
         raise Terminated from None
+
+
+def _loads(frame: FrameType | None) -> bool:
+    """Whether a compiled module is being loaded: what is raised there it prints, and makes an ImportError of."""
+    while frame is not None:
+        if frame.f_code.co_name == "create_module" and "importlib" in frame.f_code.co_filename:
+            return True
+        frame = frame.f_back
+    return False

@@ -122,7 +122,7 @@ def study(motions: Motions) -> Result | None:
     config, motion = motions.config.closed_loop, chosen(motions)
     if not config.run:
         return None
-    return NotRun() if motion is None else simulate(motions.problem, motion, config)
+    return NotRun() if motion is None else simulate(motion.solution.posed(motions.problem), motion, config)
 
 
 def effort_limits(problem: Problem) -> Array:

@@ -152,7 +152,7 @@ def _sent(motions: Motions) -> tuple[tuple[Evaluation, Resampled] | None, tuple[
     refused: list[Resampled] = []
     good = sorted((e for e in motions.solved if config.method in ("best", e.method)), key=lambda e: e.objective)
     for motion in good:
-        found = resample(motions.problem, motion, config.rate)
+        found = resample(motion.solution.posed(motions.problem), motion, config.rate)
         if not found.faults:
             return (motion, found), tuple(refused)
         refused.append(found)

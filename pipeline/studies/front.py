@@ -19,6 +19,7 @@ from pipeline.studies.study import Motions, Result
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+DURATION = "duration"  # beside the integrals
 EQUAL = 1e-6  # relative: costs closer than this are the same
 FEW = 4  # motions between the extremes that figures show one by one
 
@@ -39,7 +40,7 @@ class Front(Result):
     @property
     def objectives(self) -> list[str]:
         """The two integrals that are traded, in the order of the table's columns."""
-        return [column for column in self.table.columns if column in INTEGRALS]
+        return [column for column in self.table.columns if column == DURATION or column in INTEGRALS]
 
     @property
     def share(self) -> float:
@@ -79,7 +80,7 @@ def table(front: Sequence[Evaluation]) -> pd.DataFrame:
     statistics = front[0].solution.statistics
     rows = pd.DataFrame(statistics["front"])
     names = statistics["objectives"]
-    costs = {e.solution.optimum: {name: e.integral(name) for name in names} for e in front}
+    costs = {e.solution.optimum: {name: _value(e, name) for name in names} for e in front}
     for name in names:
         rows[name] = [costs[point][name] if point in costs else np.nan for point in rows["point"]]
     bounded = [row[row["bounded"]] / row["bound"] - 1 if row["bounded"] else np.nan for row in rows.to_dict("records")]
@@ -111,6 +112,14 @@ def table(front: Sequence[Evaluation]) -> pd.DataFrame:
             "solver_status",
         ]
     ]
+
+
+def _value(motion: Evaluation, name: str) -> float:
+    return float(motion.time[-1]) if name == DURATION else motion.integral(name)
+
+
+def _label(name: str) -> str:
+    return "motion time [s]" if name == DURATION else f"{INTEGRALS[name].label} [{INTEGRALS[name].unit}]"
 
 
 def dominated(values: Array) -> Array:
@@ -179,8 +188,8 @@ def draw(front: Front, name: str) -> Figure:
             arrowprops={"arrowstyle": "->"},
         )
     axes.set(
-        xlabel=f"{INTEGRALS[x].label} [{INTEGRALS[x].unit}]",
-        ylabel=f"{INTEGRALS[y].label} [{INTEGRALS[y].unit}]",
+        xlabel=_label(x),
+        ylabel=_label(y),
         title=f"{name}: Pareto front, hypervolume {front.share:.3f} of the extremes' rectangle",
     )
     axes.grid(True, color="0.93")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -57,9 +58,26 @@ def test_a_square_says_how_far_it_is_from_its_polygon(tmp_path: Path) -> None:
     text = "x,y,z\n0,0,0\n0.1,0,0\n0.1,0.1,0\n0,0.1,0\n0,0,0\n"
     (note,) = along(tmp_path, text, *words).reference.notes
     assert "leaves the polygon of its way-points by up to 0.0284 m" in note
-    straight = along(tmp_path, text, *words, "path.corners=rest").reference
+    straight = along(tmp_path, text, *words, "path.corners=stop").reference
     assert straight.geometry.length == pytest.approx(0.4)
-    assert straight.notes == ("the path comes to rest at way-points 2, 3, 4",)
+    assert straight.notes[0] == "the path keeps to the polygon of its way-points"
+    assert straight.notes[1] == "the path comes to rest at way-points 2, 3, 4"
+
+
+def test_a_square_with_rounded_corners(tmp_path: Path) -> None:
+    """5 mm off its corners is 5 / sqrt 2 mm off its sides; in mm it is the same path."""
+    words = ("robot=panda", "robot.task=[x,y,z]", "path.corners=blend")
+    text = "x,y,z\n0,0,0\n0.1,0,0\n0.1,0.1,0\n0,0.1,0\n0,0,0\n"
+    one = along(tmp_path, text, *words).reference
+    (note,) = one.notes
+    assert re.search(r"by up to 0\.00354 m, between way-points \d and \d$", note)
+    assert (
+        "way-points 2, 3, 4 lie too close to the next for path.blend"
+        in along(tmp_path, text, *words, "path.blend=0.03").reference.notes[1]
+    )
+    other = along(tmp_path, text.replace("0.1", "100"), *words, "path.units=mm").reference
+    t = np.linspace(0.0, one.duration, 41)
+    np.testing.assert_allclose(other.position(t), one.position(t), atol=1e-12)
 
 
 def test_a_turn_on_the_spot(tmp_path: Path) -> None:

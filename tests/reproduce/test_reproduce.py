@@ -67,6 +67,8 @@ def test_a_number_that_is_not_run_or_not_there_says_so(reproduced: Path) -> None
     row = replace(document.rows[0][1], found=Summary("case4a", "pontryagin_as_printed", 7, "final_error"))
     with pytest.raises(ResultError, match="case4a: no pontryagin_as_printed 7"):
         recompute(row.found, runs)
+    place = replace(document.places[0], rows=(row,))
+    assert list(compare([replace(document, places=(place,))], runs)["verdict"]) == ["differs"]
     assert judge(row, 0.00261) == "reproduced"
     assert command(row) == "python -m pipeline +experiment=case4a"
 

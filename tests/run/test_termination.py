@@ -7,6 +7,7 @@ import signal
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 from unittest.mock import Mock
 
 import pytest
@@ -49,6 +50,30 @@ def test_a_thread_beside_the_main_one_is_left_alone() -> None:
 
     with ThreadPoolExecutor(1) as pool:
         assert pool.submit(within).result() is signal.getsignal(signal.SIGTERM)
+
+
+LOADER = """
+def create_module():
+    signal.raise_signal(signal.SIGTERM)
+    reached.append("loaded")
+"""
+
+
+def test_a_compiled_module_is_loaded_to_its_end(staying: None) -> None:
+    """What the interpreter's own loader calls is not disturbed; right after it the process is asked to leave."""
+    reached: list[str] = []
+    loader: dict[str, Any] = {"signal": signal, "reached": reached}
+    exec(compile(LOADER, "<frozen importlib._bootstrap_external>", "exec"), loader)
+
+    def load() -> None:
+        loader["create_module"]()
+        time.sleep(10.0)  # where it arrives at the latest
+        reached.append("never")
+
+    with pytest.raises(Terminated), terminable():
+        load()
+    assert reached == ["loaded"]
+    assert signal.getitimer(signal.ITIMER_REAL) == (0.0, 0.0)
 
 
 @pytest.fixture

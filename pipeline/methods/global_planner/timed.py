@@ -73,7 +73,11 @@ class Record:
 
 def settled(context: tuple[Problem, GlobalOptions], motion: Array) -> Record:
     """See `settle`."""
-    one = settle(context, motion)
+    return recorded(settle(context, motion))
+
+
+def recorded(one: Timed) -> Record:
+    """Its numbers and words."""
     fractions = None
     if one.problem.free_law and one.converged:
         fractions = one.problem.reference.timing.sample(one.curve.times, 1.0)[0]
