@@ -6,7 +6,8 @@ which draws the problems from fixed seeds and searches each from 600 random moti
 
 Seventeen more motions, optima on 100 intervals, leave their path between the knots by more than path.tolerance and are
 not listed: on 200, 400 and 800 intervals fifteen of them cost ever more, 1.4 to 7 times as much, as jumps do, or are
-lost; on 1600 the other two, both of free7, fall into optima that are listed.
+lost; on 1600 the other two, both of free7, fall into optima that are listed. One more, of cyclic4, winds, and
+does not last either (`brute.py`).
 """
 
 from __future__ import annotations
