@@ -112,4 +112,4 @@ def _departure(geometry: Geometry, points: Array, marks: Array, kept: Array) -> 
     nearest = start + np.clip(along, 0.0, 1.0)[:, :, None] * chord
     distance = np.linalg.norm(curve - nearest, axis=2).max(axis=1)
     worst = int(np.argmax(distance))
-    return float(distance[worst]), int(kept[worst]) + 1
+    return float(distance[worst]), int(kept[worst + 1])  # past a dwell
