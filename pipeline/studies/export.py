@@ -129,6 +129,8 @@ def instead(motions: Motions, refused: Sequence[Resampled]) -> str:
         own = f"{motions.config.name}{SENDABLE}"
         shipped = f", and so does +experiment={own}" * (own in options("experiment"))
         said.append(f"{' '.join(words)} makes the planner seek one that can be{shipped}.")
+    elif not any(problem.rest) and unserved(problem) is None and not all(motion.keeps_limits for motion in refused):
+        said.append("method.global.transcription=spline keeps the limits between the knots too.")
     for motion in refused:
         off = float(f"{1.1 * motion.tracking_error:.1e}")
         if len(motion.faults) == 1 and motion.strays:

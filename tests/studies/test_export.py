@@ -215,6 +215,16 @@ def test_a_motion_that_ends_while_it_moves_or_off_its_path_is_not_sent(at_rest: 
     assert "off its path, more than path.tolerance = 0.0001 m" in faults[1]
 
 
+def test_a_transcription_that_keeps_limits_between_knots_is_named(line: Case) -> None:
+    """Where the path is entered at speed rest is no way out."""
+    problem = limited(line, velocity=1e-3)
+    moving = replace(problem, reference=replace(problem.reference, timing=ConstantSpeed(2.0)))
+    refused = resample(problem, line[1], 50.0)
+    words = "method.global.transcription=spline keeps the limits between the knots too. "
+    assert instead(Motions(composed(), moving, ()), [refused]) == words
+    assert instead(Motions(composed(), moving, ()), [resample(line[0], line[1], 50.0)]) == ""
+
+
 def test_a_tolerance_that_would_do_is_named(at_rest: Case) -> None:
     problem, motion = at_rest
     strict = replace(problem, reference=replace(problem.reference, tolerance=1e-9), rest=(True, True))
