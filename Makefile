@@ -2,6 +2,8 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+# As the package sets it for itself: where numpy is loaded before, as in the tests, that is too late.
+export OMP_NUM_THREADS := 1
 
 .DEFAULT_GOAL := help
 .PHONY: help run reproduce test fast lint format cover bench package docs pictures clean schema

@@ -83,7 +83,7 @@ def markdown(report: Report, table: pd.DataFrame, published: Printed) -> str:
 
 def _by_quantity(evaluations: Sequence[Evaluation], table: pd.DataFrame, units: Mapping[str, str]) -> list[list[str]]:
     rows = [["", *(e.label for e in evaluations)]]
-    skipped = ("method", "optimum", "message", "evidence")
+    skipped, records = ("method", "optimum", "message", "evidence"), table.to_dict("records")
     for column in table.columns:
         if (
             column in skipped
@@ -93,7 +93,7 @@ def _by_quantity(evaluations: Sequence[Evaluation], table: pd.DataFrame, units: 
             continue
         unit = units.get(column, units.get(re.sub(r"_\d+$", "", column), ""))
         cells = []
-        for row in table.to_dict("records"):
+        for row in records:
             printed = row.get(f"published_{column}", np.nan)
             text = row[column] if isinstance(row[column], str) else "" if pd.isna(row[column]) else f"{row[column]:.4g}"
             if not pd.isna(printed):

@@ -6,10 +6,13 @@ Global paper Sections 3.1.2 and 3.1.3: qd = W^-1 J'(J W^-1 J')^-1 xd with random
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from pipeline.common.arrays import Array
 from pipeline.model.arm import Arm
+from pipeline.model.kernel.arm import on_kernel
 from pipeline.model.kinematics import project
 from pipeline.problem.costs import objective_values
 from pipeline.problem.problem import Boundary, Problem
@@ -32,6 +35,8 @@ def population(
     They are spread evenly over the initial configurations `starts` (C, n); of each, the first is the inertia-weighted
     and the second the plain pseudoinverse (unless `plain` is False), the others have random constant weights.
     """
+    if not problem.task.arm.base.count:
+        problem = replace(problem, task=on_kernel(problem.task))  # thousands of motions, a knot at a time
     arm = problem.task.arm
     x_ref = problem.reference.position(times)
     which = np.arange(count) % len(starts)

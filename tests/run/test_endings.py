@@ -38,15 +38,11 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.parametrize(
-    ("what", "how", "workers"),
-    [
-        ("plan", signal.SIGKILL, 2),
-        ("front", signal.SIGTERM, 1),
-        ("sweep", signal.SIGTERM, 2),  # by SIGKILL: test_resume.py; all twelve: `python -m tests.endings`
-    ],
+    ("what", "workers"),
+    [("front", 1), ("sweep", 2)],  # by SIGKILL: test_resume.py, test_workers.py; all twelve: python -m tests.endings
 )
 def test_a_run_that_is_ended_goes_on(
-    what: str, how: signal.Signals, workers: int, tmp_path: Path, undisturbed: Path, monkeypatch: pytest.MonkeyPatch
+    what: str, workers: int, tmp_path: Path, undisturbed: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     folder = tmp_path / "out"
     words = (*WHAT[what], f"parallel.workers={workers}", placed(what, folder))
@@ -55,13 +51,10 @@ def test_a_run_that_is_ended_goes_on(
     running = begin(*words, cwd=tmp_path)
     wait_until(lambda: len(kept(store)) >= 3 or running.poll() is not None)
     assert running.poll() is None
-    said, took = end(running, how)
+    said, took = end(running, signal.SIGTERM)
     assert took < GONE + BUSY
-    if how is signal.SIGTERM:
-        assert (running.returncode, said) == (143, SAID)
-        assert not strays(folder)
-    else:
-        assert running.returncode == -signal.SIGKILL
+    assert (running.returncode, said) == (143, SAID)
+    assert not strays(folder)
     before = {file: file.stat().st_mtime_ns for file in kept(store)}
     assert len(before) >= 3
     assert not (at_work / "run.json").exists()
