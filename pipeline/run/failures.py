@@ -34,8 +34,8 @@ def told(error: BaseException) -> tuple[str, int]:
     Drake's assertions are SystemExit with a text: they fail in Drake's own code, on numbers that it did not expect.
     """
     match error:
-        case InputError():
-            return str(error), 2
+        case InputError():  # one line, whatever separators the input has that it cites
+            return _joined(error), 2
         case KeyboardInterrupt():
             return "interrupted", 130
         case Terminated():

@@ -98,6 +98,12 @@ def test_what_nobody_foresaw_is_no_bad_input() -> None:
     assert told(SystemExit("abort\n at a.cc")) == ("Drake: abort at a.cc", 1)
 
 
+def test_bad_input_is_one_line_whatever_separators_it_cites() -> None:
+    """As a header of way-points with the separator of records, found by the fuzz test."""
+    for separator in ("\x1e", "\u2028", "\x85", "\n"):
+        assert told(InputError(f"the header is a{separator}b")) == ("the header is a b", 2)
+
+
 def test_who_was_asked_to_leave_has_not_failed() -> None:
     asked = (SystemExit(3), SystemExit(), KeyboardInterrupt(), Terminated())
     assert all(leaves(error) for error in asked)
