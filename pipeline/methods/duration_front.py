@@ -42,7 +42,7 @@ def solve(problem: Problem, options: ParetoOptions, context: Context) -> list[So
         return [replace(fastest, method="pareto", message=f"the shortest time was not found: {fastest.message}")]
     shortest = fastest.reference.duration
     if shortest >= longest:
-        why = f"timing.duration = {longest:g} s is less than the shortest feasible duration {shortest:.4g} s"
+        why = f"timing.duration = {longest:g} s is less than the shortest feasible duration found, {shortest:.4g} s"
         return [replace(fastest, method="pareto", status=Status.INFEASIBLE, message=why, reference=None, found=False)]
     durations = np.geomspace(shortest, longest, options.steps + 1)[1:]
     begun = fastest.trajectory

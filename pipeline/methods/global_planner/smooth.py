@@ -262,7 +262,7 @@ def _nothing(problem: Problem, fastest: Smooth | None, splines: list[Smooth], lo
     assert violation is not None
     message = (
         f"{violation.bound} cannot be met between the knots: the least excess found is {violation.extent}; "
-        f"shortest feasible duration {duration:.4g} s"
+        f"shortest feasible duration {duration:.4g} s, as far as was found"
     )
     return nothing(problem, Status.INFEASIBLE, message, statistics)
 

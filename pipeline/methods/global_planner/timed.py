@@ -95,7 +95,7 @@ def timed(problem: Problem, found: list[Solution], options: GlobalOptions, conte
         words = "; ".join(sorted({answer.status for answer in answers}))
         if np.isfinite(shortest):
             asked = f"timing.duration = {problem.reference.duration:g} s"
-            why = f"no law keeps every limit in {asked}; shortest feasible duration {shortest:.4g} s"
+            why = f"no law was found that keeps every limit in {asked}; shortest feasible duration {shortest:.4g} s"
             return [nothing(problem, Status.INFEASIBLE, why, log)]
         why = f"no timing was found from {len(answers)} optima ({words}); try more knots (timing.steps)"
         return [nothing(problem, Status.NOT_CONVERGED, why, log)]
