@@ -100,6 +100,10 @@ def _here(count: int, function: Any, context: Any, work: list[tuple[Path | None,
             yield _one(function, context, item, file)
         return
     given, restarted = 0, False
+    # Loky's tracker takes away what a run that is ended leaves behind; it need not warn of it on our terminal.
+    quiet = "ignore:resource_tracker:UserWarning"
+    if quiet not in os.environ.get("PYTHONWARNINGS", ""):
+        os.environ["PYTHONWARNINGS"] = ",".join(filter(None, [os.environ.get("PYTHONWARNINGS"), quiet]))
     while given < len(work):
         jobs = (delayed(_in_a_worker)(function, context, item, file) for file, item in work[given:])
         ours = {"initializer": _follow, "initargs": (os.getpid(),)}
