@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Protocol, TypeVar
+from typing import Protocol, Self, TypeVar
 
 import numpy as np
 from scipy.interpolate import BPoly, CubicSpline
@@ -138,22 +139,39 @@ class WithStops(Scalable):
 
 
 @dataclass(frozen=True)
-class Stamped:
-    """The fractions (P,) of the length at times (P,) [s], from 0 on: rest to rest, and at rest in `stops` (indices).
+class Tabled(ABC):
+    """A law through fractions (P,) of the length at times (P,) [s], from 0 on; how it goes between is `_law`."""
+
+    times: tuple[float, ...]
+    fractions: tuple[float, ...]
+
+    @property
+    def duration(self) -> float:
+        return self.times[-1]
+
+    @property
+    @abstractmethod
+    def _law(self) -> BPoly | CubicSpline: ...
+
+    def sample(self, t: Array, length: float) -> tuple[Array, Array, Array]:
+        return length * self._law(t), length * self._law(t, 1), length * self._law(t, 2)
+
+    def slowed(self, by: float) -> Self:
+        """The same law in `by` times the time."""
+        return replace(self, times=tuple(by * time for time in self.times))
+
+
+@dataclass(frozen=True)
+class Stamped(Tabled):
+    """Rest to rest past time stamps, and at rest in `stops` (indices).
 
     Quintics with continuous acceleration, which is zero at the time stamps. The speed there is the harmonic mean of
     the mean speeds before and after (Fritsch and Butland 1984), at most 5/4 of either: then the Bezier points of
     the speed, d0, d0, 5 v - 2 (d0 + d1), d1, d1 with mean speed v, are not negative, and no quintic runs backwards.
     """
 
-    times: tuple[float, ...]
-    fractions: tuple[float, ...]
     stops: tuple[int, ...] = ()
     at_rest: bool = True
-
-    @property
-    def duration(self) -> float:
-        return self.times[-1]
 
     @cached_property
     def _law(self) -> BPoly:
@@ -166,35 +184,13 @@ class Stamped:
         speed[list(self.stops)] = 0.0
         return BPoly.from_derivatives(self.times, np.column_stack([s, speed, np.zeros(len(s))]))
 
-    def sample(self, t: Array, length: float) -> tuple[Array, Array, Array]:
-        return length * self._law(t), length * self._law(t, 1), length * self._law(t, 2)
-
-    def slowed(self, by: float) -> Stamped:
-        """The same law in `by` times the time."""
-        return replace(self, times=tuple(by * time for time in self.times))
-
 
 @dataclass(frozen=True)
-class Found:
-    """A law that was optimised: the C2 cubic spline, at rest at both ends, through fractions (N + 1,) of the length at
-    times (N + 1,) [s], from 0 on.
-    """
+class Found(Tabled):
+    """A law that was optimised: the C2 cubic spline, at rest at both ends."""
 
-    times: tuple[float, ...]
-    fractions: tuple[float, ...]
     at_rest: bool = True
-
-    @property
-    def duration(self) -> float:
-        return self.times[-1]
 
     @cached_property
     def _law(self) -> CubicSpline:
         return CubicSpline(self.times, self.fractions, bc_type="clamped")
-
-    def sample(self, t: Array, length: float) -> tuple[Array, Array, Array]:
-        return length * self._law(t), length * self._law(t, 1), length * self._law(t, 2)
-
-    def slowed(self, by: float) -> Found:
-        """The same law in `by` times the time."""
-        return replace(self, times=tuple(by * time for time in self.times))
