@@ -69,12 +69,6 @@ class PlanarArm:
             vy += rate[i] * self.length[i] * ca.cos(angle[i])
         return energy
 
-    def inverse_dynamics(self, q: ca.SX, qd: ca.SX, qdd: ca.SX) -> ca.SX:
-        """Joint torques by Lagrange's equations, without gravity."""
-        energy = self.kinetic_energy(q, qd)
-        momentum = ca.gradient(energy, qd)
-        return ca.jtimes(momentum, qd, qdd) + ca.jtimes(momentum, q, qd) - ca.gradient(energy, q)
-
 
 def kinetic_energy_program(
     arm: PlanarArm, intervals: int, dt: float, tolerance: float = 1e-8, *, expand: bool = False
@@ -109,11 +103,14 @@ class Arm(Protocol):
     def kinetic_energy(self, q: ca.SX, qd: ca.SX) -> ca.SX:
         """[J]."""
 
-    def inverse_dynamics(self, q: ca.SX, qd: ca.SX, qdd: ca.SX) -> ca.SX:
-        """(n,) [N m], without gravity."""
-
     def rows(self, q: ca.SX, target: ca.SX) -> ca.SX:
         """(m,): zero where the end effector is as the target says."""
+
+
+def torques(energy: ca.SX, q: ca.SX, qd: ca.SX, qdd: ca.SX) -> ca.SX:
+    """Joint torques (n,) [N m] by Lagrange's equations from the kinetic energy, without gravity."""
+    momentum = ca.gradient(energy, qd)
+    return ca.jtimes(momentum, qd, qdd) + ca.jtimes(momentum, q, qd) - ca.gradient(energy, q)
 
 
 @dataclass
@@ -144,7 +141,7 @@ class Program:
         state, rate, acceleration = (ca.SX.sym(name, n) for name in ("q", "qd", "qdd"))
         kept = [(rate, velocity)]
         if self.torque or np.isfinite([torque, power]).any():
-            tau = self.arm.inverse_dynamics(state, rate, acceleration)
+            tau = torques(self.arm.kinetic_energy(state, rate), state, rate, acceleration)
             kept += [(tau, torque), (tau * rate, power)]
         term = ca.sumsqr(tau) if self.torque else self.arm.kinetic_energy(state, rate)
         limited = [(quantity[i], bound[i]) for quantity, bound in kept for i in range(n) if np.isfinite(bound[i])]

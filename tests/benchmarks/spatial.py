@@ -41,9 +41,6 @@ class SpatialArm:
             energy += 0.5 * ca.dot(angular, chain.inertia[j] @ angular)
         return energy
 
-    def inverse_dynamics(self, q: ca.SX, qd: ca.SX, qdd: ca.SX) -> ca.SX:
-        raise NotImplementedError("the benchmarks' arms in space keep their torque limits by themselves")
-
     def rows(self, q: ca.SX, target: ca.SX) -> ca.SX:
         chain, rotation, at = self.chain, ca.SX.eye(3), ca.SX.zeros(3)
         for j in range(self.n):

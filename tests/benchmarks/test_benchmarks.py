@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import re
 
+import casadi as ca
+import numpy as np
 import pytest
 
+from pipeline.build.problem import prepare
 from tests.benchmarks import __main__ as benchmarks
-from tests.benchmarks import planner, scaling
-from tests.support import FEW_STARTS
+from tests.benchmarks import peer, planner, scaling
+from tests.benchmarks.spatial import SpatialArm
+from tests.support import FEW_STARTS, composed
 
 
 def line_of(name: str, out: str) -> list[float]:
@@ -40,6 +44,15 @@ def test_the_planner_beside_its_peer(name: str, steps: int, capsys: pytest.Captu
     assert costs["ours"] == pytest.approx(costs["peer"], rel=1e-5)
     assert float(re.findall(r"costs within (\S+),", out)[0]) < 1e-9
     assert float(re.findall(r"limits kept to (\S+)", out)[0]) < 1e-6
+
+
+def test_the_peers_torques_in_space_are_drakes(rng: np.random.Generator) -> None:
+    task = prepare(composed("+experiment=panda_pose")).task
+    symbols = [ca.SX.sym(name, task.arm.n) for name in ("q", "qd", "qdd")]
+    torques = peer.torques(SpatialArm(task).kinetic_energy(*symbols[:2]), *symbols)
+    q, qd, qdd = rng.normal(size=(3, 1, task.arm.n))
+    found = np.array(ca.Function("tau", symbols, [torques])(q[0], qd[0], qdd[0])).ravel()
+    np.testing.assert_allclose(found, task.arm.inverse_dynamics(q, qd, qdd)[0], atol=1e-12)
 
 
 @pytest.mark.slow
