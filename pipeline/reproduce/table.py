@@ -51,9 +51,10 @@ def compare(documents: Sequence[Document], runs: Runs) -> pd.DataFrame:
             try:
                 value = recompute(row.found, runs)
                 word = judge(row, value)
+            except NotRunError as error:
+                value, note, word = float("nan"), str(error), NOT_RUN
             except ResultError as error:
-                value, note = float("nan"), str(error)
-                word = NOT_RUN if isinstance(error, NotRunError) else judge(row, value)
+                value, note, word = float("nan"), str(error), judge(row, float("nan"))
             rows.append(
                 {
                     "document": document.name,
