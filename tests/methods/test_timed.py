@@ -105,7 +105,7 @@ def test_the_answer_is_judged_by_its_own_law(motion: Array) -> None:
     judged = evaluate(asked, answer)
     assert judged.status is Status.SOLVED
     assert answer.reference is not None
-    assert answer.message == f"shortest duration {answer.reference.duration:.4g} s, law of the path free"
+    assert answer.message == f"shortest duration found {answer.reference.duration:.4g} s, law of the path free"
     short = replace(asked, free_duration=False).slowed(0.5 * answer.reference.duration)
     (none,) = timed(short, begun, OPTIONS, Context())
     assert none.status is Status.INFEASIBLE

@@ -1,4 +1,4 @@
-"""All starts, and all distinct optima, of one grid in one batch: Newton's method, and IPOPT's confirmation at the end.
+"""All starts, and the distinct optima found, of one grid in one batch: Newton's method, then IPOPT's confirmation.
 
 What Newton's method does not serve (`serve.py`) is left to `optimum.py`, IPOPT alone.
 """

@@ -103,7 +103,9 @@ def timed(problem: Problem, found: list[Solution], options: GlobalOptions, conte
     reference = best.reference(problem)
     duration = reference.duration
     kept = "law of the path kept" if not problem.free_law else "law of the path free"
-    message = f"shortest duration {duration:.4g} s, {kept}" if problem.free_duration else f"{kept}, in {duration:.4g} s"
+    message = (
+        f"shortest duration found {duration:.4g} s, {kept}" if problem.free_duration else f"{kept}, in {duration:.4g} s"
+    )
     return [
         Solution(
             "global",
