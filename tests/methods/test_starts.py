@@ -95,6 +95,8 @@ def test_whole_turns_are_one_optimum_and_the_first_start_of_a_basin_dates_it() -
     assert found.barren == 1
     near = basins(problem, problem.times, ends(0.0, 0.5, 1.0, cost=2.0), 0.05, dearest=1.3)
     assert [optimum.cost for optimum in near.optima] == [2.0, 2.5]
+    below = basins(problem, problem.times, ends(0.0, 0.5, 1.0, cost=-2.0), 0.05, dearest=1.3)  # as a criterion makes it
+    assert [optimum.cost for optimum in below.optima] == [-2.0, -1.5]
 
 
 def test_further_starts_stand_on_the_knots_asked_for() -> None:

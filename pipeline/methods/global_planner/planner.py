@@ -16,7 +16,7 @@ from scipy.interpolate import CubicSpline
 from pipeline.common.arrays import Array
 from pipeline.config.methods import GlobalOptions
 from pipeline.methods import dynamic_programming
-from pipeline.methods.global_planner.basins import Basins, basins
+from pipeline.methods.global_planner.basins import Basins, basins, ceiling
 from pipeline.methods.global_planner.batch import JUMPS, Batch
 from pipeline.methods.global_planner.grids import coarsest, finer, on_knots, refinement
 from pipeline.methods.global_planner.optimum import Optimum, go_on, optimise_start, refine
@@ -203,7 +203,7 @@ def _draw_on(
     while True:
         motions = drawn.further(max(0, min(len(starts), options.budget - len(starts))), grid)
         if len(motions):
-            dear = DEAREST * min(start.cost for start in starts if start.converged)
+            dear = ceiling(min(start.cost for start in starts if start.converged), DEAREST)
             fresh, done = batch.coarse(grid, motions, dear), _teller(context, len(motions), starts)
             for count, start in enumerate(fresh, 1):
                 done(count, start)
