@@ -1,4 +1,4 @@
-"""Nothing that is written here stays unrun: pytest passes over folders by their names, `build` among them by default."""
+"""Nothing that is written here stays unrun: pytest passes over folders by their names, by default `build` too."""
 
 from __future__ import annotations
 
