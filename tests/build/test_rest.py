@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -64,3 +65,13 @@ def test_limits_of_a_file_give_way_to_values() -> None:
     assert np.isinf(problem.bounds.jerk).all()
     own = prepare(composed("+experiment=xarm7", "limits.file=robots/xarm7_limits.yaml", "limits.acceleration=3"))
     np.testing.assert_array_equal(own.bounds.acceleration, 3.0)
+
+
+def test_a_file_limits_the_joints_that_it_names(tmp_path: Path) -> None:
+    """The others keep the limits of the description."""
+    file = tmp_path / "limits.yaml"
+    file.write_text("joint_limits: {joint2: {has_velocity_limits: true, max_velocity: 0.25}}")
+    own = prepare(composed("limits=joint")).bounds.velocity
+    assert np.isfinite(own).all()
+    found = prepare(composed("limits=joint", f"limits.file={file}")).bounds.velocity
+    np.testing.assert_array_equal(found, [own[0], 0.25, own[2]])
