@@ -100,7 +100,8 @@ def make_reference(path: Any, timing: TimingConfig, task: Task, q_init: Array) -
     start = np.hstack([one.sample(np.zeros(1))[0] for one in (geometry, orientation) if one is not None])
     if np.abs(task.error(q_init[None], start)).max() > 1e-12:
         q_init = place(task, q_init, start[0])
-    return Reference(geometry, law, orientation, path.tolerance, path.orientation_tolerance, notes), q_init
+    tolerances = path.tolerance, path.orientation_tolerance
+    return Reference(geometry, law, orientation, *tolerances, notes, path.exact), q_init
 
 
 def _curve(path: Any, task: Task, here: Array) -> Geometry:

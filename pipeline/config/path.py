@@ -48,6 +48,10 @@ class PathConfig:
         0.0,
         0.0,
     )
+    exact: Annotated[
+        Switch,
+        Field(description="whether every knot is on the path; false: a motion may use all of the tolerances, anywhere"),
+    ] = True
     tolerance: Annotated[Number, Field(gt=0, description="[m] how far from it a motion may be between its knots")] = (
         1e-4
     )
