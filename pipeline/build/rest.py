@@ -9,7 +9,7 @@ from pipeline.common.errors import ConfigError
 from pipeline.model.kinematics import project
 from pipeline.problem.problem import Boundary, Problem
 
-PACE = ("velocity", "acceleration", "jerk", "torque", "power", "tool_speed", "tool_acceleration")
+PACE = ("velocity", "acceleration", "jerk", "torque", "power")
 
 
 SHARE = 0.05  # of the motion time, in which the suggested acceleration reaches the motion's largest joint speed
