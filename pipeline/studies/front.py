@@ -194,6 +194,9 @@ def draw(front: Front, name: str) -> Figure:
         ylabel=_label(y),
         title=f"{name}: Pareto front, hypervolume {front.share:.3f} of the extremes' rectangle",
     )
+    for name, scale in ((x, axes.set_xscale), (y, axes.set_yscale)):
+        if name == TOLERANCE:  # from a motion on its path to one that is as far off as it may be
+            scale("log")
     axes.grid(True, color="0.93")
     axes.set_axisbelow(True)
     axes.legend(fontsize=9)
