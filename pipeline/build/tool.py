@@ -24,7 +24,11 @@ def check_tool(problem: Problem) -> None:
                 "limits.tool_speed, limits.tool_acceleration: they are kept by the law of the path, which a motion "
                 "with path.exact = false need not follow to the point; set path.exact=true"
             )
-    if bounds.limits_tool and not problem.free_timing:
+    if not bounds.limits_tool:
+        return
+    if not reference.geometry.sample(np.linspace(0.0, reference.geometry.length, 9))[1].any():
+        raise ConfigError("limits.tool_speed, limits.tool_acceleration: the tool turns on the spot, and goes nowhere")
+    if not problem.free_timing:
         _check_pace(problem)
 
 

@@ -53,3 +53,9 @@ def test_the_shortest_time_needs_limits_of_joints() -> None:
     with pytest.raises(ConfigError, match=r"set limits.velocity, limits.acceleration or limits.torque$"):
         prepare(composed(*words))
     assert prepare(composed(*words, "limits.velocity=3")).bounds.limits_tool
+
+
+def test_a_turn_on_the_spot_has_no_pace() -> None:
+    words = ("robot=panda", "robot.orientation=full", "path.length=0", "path.turn=[0,0,0.3]", "limits.tool_speed=1")
+    with pytest.raises(ConfigError, match=r"the tool turns on the spot, and goes nowhere$"):
+        prepare(composed(*words))
