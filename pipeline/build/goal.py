@@ -45,8 +45,14 @@ def make_limits(limits: LimitsConfig, arm: Arm) -> Limits:
         power=bound("power", free),
         acceleration=bound("acceleration", free),
         jerk=bound("jerk", free),
-        attitude=np.inf if limits.attitude is None else limits.attitude,
+        attitude=_one(limits.attitude),
+        tool_speed=_one(limits.tool_speed),
+        tool_acceleration=_one(limits.tool_acceleration),
     )
+
+
+def _one(bound: float | None) -> float:
+    return np.inf if bound is None else bound
 
 
 def make_objective(config: RunConfig, arm: Arm) -> Objective:

@@ -8,6 +8,7 @@ from pipeline.build.goal import make_limits, make_objective, make_obstacles
 from pipeline.build.path import make_knots, make_reference, make_task
 from pipeline.build.rest import check_rest
 from pipeline.build.robot import initial, load
+from pipeline.build.tool import check_tool
 from pipeline.config.run import RunConfig
 from pipeline.config.steps import refuse_endless
 from pipeline.problem.problem import Boundary, Problem
@@ -45,4 +46,5 @@ def prepare(config: RunConfig) -> Problem:
     if config.base.kind == "fixed":
         require_reach(problem)
     check_rest(problem)
+    check_tool(problem)
     return base.place(problem, config)

@@ -122,6 +122,14 @@ class LimitsConfig:
     jerk: Annotated[
         OneOrList[Bound] | None, Field(description="[rad/s^3] largest joint jerk; needs boundary.zero_acceleration")
     ] = None
+    tool_speed: Annotated[
+        Bound | None,
+        Field(description="[m/s] largest linear speed of the end effector; how fast it turns is not limited"),
+    ] = None
+    tool_acceleration: Annotated[
+        Bound | None,
+        Field(description="[m/s^2] largest linear acceleration of the end effector, along its path and across it"),
+    ] = None
     file: Annotated[
         Text | None,
         Field(description="YAML file of ROS 2, joint_limits.yaml: what it states holds, a value given here overrides"),

@@ -18,7 +18,7 @@ from scipy.spatial.distance import squareform
 
 from pipeline.common.arrays import Array
 from pipeline.config.methods import ParetoOptions
-from pipeline.methods import duration_front
+from pipeline.methods import duration_front, tolerance_front
 from pipeline.methods.global_planner.grids import finer
 from pipeline.methods.global_planner.optimum import stays_on_path
 from pipeline.methods.global_planner.planner import TRACKING, global_planner
@@ -73,6 +73,8 @@ def solve(problem: Problem, options: ParetoOptions, context: Context) -> list[So
     """
     if duration_front.DURATION in options.objectives:
         return duration_front.solve(problem, options, context)
+    if tolerance_front.TOLERANCE in options.objectives:
+        return tolerance_front.solve(problem, options, context)
     while True:
         solutions = _front(problem, options, context)
         time = solutions[0].trajectory.time
@@ -131,7 +133,11 @@ def refuses(problem: Problem, options: ParetoOptions) -> str | None:
     if len(options.objectives) != 2:
         return f"method.pareto.objectives = [{', '.join(options.objectives)}]: a front is one of two integrals"
     if duration_front.DURATION in options.objectives:
+        if tolerance_front.TOLERANCE in options.objectives:
+            return "method.pareto.objectives = [duration, path_tolerance]: one of them goes with an integral"
         return duration_front.refuses(problem, options)
+    if tolerance_front.TOLERANCE in options.objectives:
+        return tolerance_front.refuses(problem, options)
     if why := ON_KNOTS.why_not(problem):
         return why
     each = (replace(problem, objective=Objective({name: 1.0})) for name in options.objectives)

@@ -209,7 +209,7 @@ def _faults(
         (checked.tracking_error, reference.tolerance, "m", "tolerance"),
         (checked.orientation_error, reference.orientation_tolerance, "rad", "orientation_tolerance"),
     ):
-        if not error <= allowed:
+        if not error <= allowed * (1 + TOLERANCE):
             faults.append(f"is up to {error:.2g} {unit} off its path, more than path.{key} = {allowed:g} {unit}")
     return faults
 
