@@ -124,7 +124,7 @@ def instead(motions: Motions, refused: Sequence[Resampled]) -> str:
     problem, said = motions.problem, []
     if not all(problem.rest) and problem.reference.timing.at_rest and unserved(problem) is None:
         words = ["boundary.rest=[start,end]"]
-        if unlimited_start(problem):
+        if unlimited_start(problem) and motions.config.robot.limits is None:
             words.append(f"limits.acceleration={suggested(problem):g}")
         own = f"{motions.config.name}{SENDABLE}"
         shipped = f", and so does +experiment={own}" * (own in options("experiment"))

@@ -17,7 +17,13 @@ BODY = (
     '<inertia ixx="0.001" iyy="0.008" izz="0.008" ixy="0" ixz="0" iyz="0"/></inertial>'
 )
 POINT = '<inertial><origin xyz="0.15 0 0"/><mass value="0.5"/></inertial>'
-WORDS = ("robot.end_effector=tool", "robot.q_init=[0.3,0.8,-1.2]", "path.length=0.15", "path.direction=120")
+WORDS = (
+    "robot.end_effector=tool",
+    "robot.q_init=[0.3,0.8,-1.2]",
+    "path.length=0.15",
+    "path.direction=120",
+    "boundary.rest=[]",
+)
 
 
 def planar(limit: str = 'velocity="5" effort="20"', last: str = BODY.format(com=0.15, mass=0.5)) -> str:

@@ -103,7 +103,7 @@ def unserved(problem: Problem, options: GlobalOptions) -> str | None:
     if any(problem.rest) or problem.bounds.smooth:
         return (
             "method.global.transcription = differences keeps neither boundary.rest nor limits.acceleration or "
-            "limits.jerk; set it to spline"
+            "limits.jerk; set it to spline, or boundary.rest=[] and no such limits"
         )
     return None
 
