@@ -73,6 +73,7 @@ def solve(problem: Problem, options: ParetoOptions, context: Context) -> list[So
     """
     if duration_front.DURATION in options.objectives:
         return duration_front.solve(problem, options, context)
+    options = _by_differences(options)
     while True:
         solutions = _front(problem, options, context)
         time = solutions[0].trajectory.time
@@ -81,6 +82,12 @@ def solve(problem: Problem, options: ParetoOptions, context: Context) -> list[So
         if times is None:
             return solutions
         problem = replace(problem, times=times)
+
+
+def _by_differences(options: ParetoOptions) -> ParetoOptions:
+    """The points of a front are by differences, and so are the planner's motions unless a spline is asked for."""
+    planner = options.planner
+    return replace(options, planner=replace(planner, transcription=planner.transcription or "differences"))
 
 
 def _front(problem: Problem, options: ParetoOptions, context: Context) -> list[Solution]:
@@ -135,7 +142,7 @@ def refuses(problem: Problem, options: ParetoOptions) -> str | None:
     if why := ON_KNOTS.why_not(problem):
         return why
     each = (replace(problem, objective=Objective({name: 1.0})) for name in options.objectives)
-    return next((why for own in each if (why := global_planner.why_not(own, options.planner))), None)
+    return next((why for own in each if (why := global_planner.why_not(own, _by_differences(options).planner))), None)
 
 
 pareto = Method("pareto", "Pareto point", "#2F855A", ParetoOptions, WITH_TIMING, solve, refuses)
