@@ -114,7 +114,7 @@ class GlobalOptions:
         Literal["differences", "spline"] | None,
         Field(
             description="differences: backward, as in the papers; spline: a smooth curve that keeps its limits between "
-            "the knots too; null: spline where boundary.rest, limits.acceleration or limits.jerk ask for it"
+            "the knots too; null: spline where boundary.rest, limits of acceleration or jerk, or an obstacle ask for it"
         ),
     ] = None
     nodes: Annotated[Whole, Field(ge=8, le=10_000, description="of the roadmap, in each layer")] = 300

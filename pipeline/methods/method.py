@@ -83,7 +83,7 @@ class Serves:
         if not self.moving_base:
             parts.append("arms on a fixed base")
         if not self.rest:
-            parts.append("motions without boundary.rest and limits of acceleration or jerk")
+            parts.append("motions without rest at an end (boundary.rest=[]) and limits of acceleration or jerk")
         return "are " + "; ".join(parts) if parts else "is every problem"
 
 

@@ -18,7 +18,13 @@ BODY = (
 )
 INERTIA = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 POINT = '<inertial><origin xyz="0.15 0 0"/><mass value="0.5"/></inertial>'
-WORDS = ("robot.end_effector=tool", "robot.q_init=[0.3,0.8,-1.2]", "path.length=0.15", "path.direction=120")
+WORDS = (
+    "robot.end_effector=tool",
+    "robot.q_init=[0.3,0.8,-1.2]",
+    "path.length=0.15",
+    "path.direction=120",
+    "boundary.rest=[]",
+)
 
 
 def planar(limit: str = 'velocity="5" effort="20"', last: str = BODY.format(com=0.15, mass=0.5)) -> str:

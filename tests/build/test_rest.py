@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from pipeline.build.problem import prepare
-from pipeline.common.errors import ConfigError
-from tests.support import composed
+from pipeline.common.errors import ConfigError, RobotError
+from tests.support import ROOT, composed
 
 ENDS, START = "boundary.rest=[start,end]", "boundary.rest=[start]"
 SPEED = ("timing=constant_speed", "timing.duration=2")
@@ -56,6 +56,58 @@ def test_the_suggested_acceleration_is_one_that_does() -> None:
     (number,) = re.findall(r"such as (\S+) rad/s", str(refused.value))
     assert 0.05 < float(number) < 20
     assert prepare(composed(ENDS, f"limits.acceleration={number}")).bounds.smooth
+
+
+PANDA = ("robot=panda", "path.direction=[0,1,0]", "path.length=0.1", "timing.steps=4")
+SHEET = [15.0, 7.5, 10.0, 12.5, 15.0, 20.0, 20.0]  # [rad/s^2]
+OWN = ("robot.end_effector=tip", "path.length=0.1", "timing.steps=4")
+
+
+@pytest.mark.parametrize(
+    ("words", "rests"),
+    [
+        ((), True),
+        (("boundary=free", "limits=joint"), True),
+        (("boundary.rest=[]",), False),
+        (("timing=constant_speed",), False),
+        (("base=free", "base.mass=60"), False),
+        (("objective=reaction",), False),
+        (("methods=[lsv,pmke]",), False),
+        (("robot=planar3r", "path.direction=90"), False),
+    ],
+)
+def test_arms_that_are_not_the_papers_rest_at_both_ends(words: tuple[str, ...], rests: bool) -> None:
+    """Within the accelerations of their data sheet, unless the command line says otherwise."""
+    problem = prepare(composed(*PANDA, *words))
+    assert problem.rest == (rests, rests)
+    assert problem.bounds.smooth == rests
+    if rests:
+        np.testing.assert_array_equal(problem.bounds.acceleration, SHEET)
+        assert np.isinf(problem.bounds.jerk).all()
+
+
+def test_accelerations_of_the_robot_give_way() -> None:
+    own = prepare(composed(*PANDA, "limits.acceleration=3"))
+    np.testing.assert_array_equal(own.bounds.acceleration, 3.0)
+    with pytest.raises(ConfigError, match="there is no best motion from rest"):
+        prepare(composed(*PANDA, "limits.acceleration=1e9"))
+    with pytest.raises(RobotError, match=r"^robot\.limits = .*panda_limits\.yaml: states limits of panda_joint1, .*"):
+        prepare(composed("boundary.rest=[start]", "robot.limits=robots/panda_limits.yaml"))
+
+
+def test_an_arm_of_ones_own_is_told_a_number(tmp_path: Path) -> None:
+    """From the torques of its file: the same arm, a hundred times as weak, can speed up by less."""
+    text = (ROOT / "robots" / "planar3r.urdf").read_text(encoding="utf-8")
+    numbers = {}
+    for name, effort in (("strong", "0.4"), ("weak", "0.004")):
+        file = tmp_path / f"{name}.urdf"
+        file.write_text(text.replace('effort="0.4"', f'effort="{effort}"'), encoding="utf-8")
+        with pytest.raises(ConfigError) as refused:
+            prepare(composed(*OWN, f"robot.urdf={file}", "timing.duration=1"))
+        assert str(refused.value).endswith("boundary.rest=[] lets it jump")
+        numbers[name] = float(re.findall(r"set limits.acceleration, such as (\S+) rad/s", str(refused.value))[0])
+        assert all(prepare(composed(*OWN, f"robot.urdf={file}", f"limits.acceleration={numbers[name]}")).rest)
+    assert 0 < numbers["weak"] < numbers["strong"]
 
 
 def test_limits_of_a_file_give_way_to_values() -> None:
