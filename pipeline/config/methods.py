@@ -71,9 +71,9 @@ class PmkeOptions:
     update_interval: Annotated[Positive, Field(description="[s] between predictions (I)")] = 0.5
     objective: Prediction = "problem"
     interpolation: Annotated[
-        Literal["quintic", "cubic"],
-        Field(description="through the predicted knots; quintic: as the paper's end conditions need"),
-    ] = "quintic"
+        Literal["quartic", "quintic", "cubic"],
+        Field(description="through the predicted knots; quartic: the paper's, with a knot inside each interval"),
+    ] = "quartic"
     gain: Gain = 0.0
     tolerance: Annotated[Positive, Field(description="of a prediction, relative to its energy")] = 1e-8
     singular_value: Singular = 0.03
