@@ -15,6 +15,7 @@ from omegaconf import OmegaConf
 from pipeline.common.files import write_beside
 from pipeline.common.markdown import markdown_table
 
+PAGE = "report.html"
 # Title in sweep.md, column of summary.csv, format, factor.
 NUMBERS = (
     ("kinetic energy [J s]", "kinetic_energy_integral", "{:.4g}", 1),
@@ -47,28 +48,37 @@ def exit_code(folder: Path) -> int:
 
 
 def write(folder: Path, runs: Sequence[Path] | None = None) -> None:
-    """sweep.csv and sweep.md in `folder`, of `runs` (None: all below it that left a summary)."""
+    """sweep.csv, sweep.md and report.html in `folder`, of `runs` (None: all below it that left a summary)."""
     if runs is None:
         runs = [file.parent for file in folder.glob("*/summary.csv")]
     if not runs:
         return
     runs = sorted(runs, key=lambda run: _natural(run.name))
+    save(folder, "sweep", f"Sweep {folder.name}", runs, [run.name for run in runs])
+    print(f"sweep table in {folder / 'sweep.md'}")
+
+
+def save(folder: Path, name: str, title: str, runs: Sequence[Path], names: Sequence[str]) -> None:
+    """The table of `runs`, called `names`, as `name`.csv and `name`.md, and the page over all of them."""
     overrides = _swept([_overrides(run) for run in runs])
     parts = []
-    for run, own in zip(runs, overrides, strict=True):
+    for run, called, own in zip(runs, names, overrides, strict=True):
         part = _summary(run)
         taken = set(part.columns)
         words = {key if key not in taken else f"override {key}": value for key, value in own.items()}
-        parts.append(pd.concat([pd.DataFrame({"run": run.name, **words}, index=part.index), part], axis=1))
+        parts.append(pd.concat([pd.DataFrame({"run": called, **words}, index=part.index), part], axis=1))
     table = pd.concat(parts, ignore_index=True)
-    write_beside(folder / "sweep.csv", lambda file: table.to_csv(file, index=False))
+    write_beside(folder / f"{name}.csv", lambda file: table.to_csv(file, index=False))
     swept = list(table.columns[1 : 1 + len(overrides[0])])
     notes = table["published_note"].dropna().unique().tolist() if "published_note" in table else []
     rows = [["run", *swept, "method", "status", *(title for title, *_ in NUMBERS), "message"]]
     rows += [_cells(row, swept) for row in table.to_dict("records")]
-    text = "\n".join([f"# Sweep {folder.name}", "", *markdown_table(rows), "", *(f"- {note}" for note in notes), ""])
-    write_beside(folder / "sweep.md", lambda file: file.write_text(text, encoding="utf-8"))
-    print(f"sweep table in {folder / 'sweep.md'}")
+    text = "\n".join([f"# {title}", "", *markdown_table(rows), "", *(f"- {note}" for note in notes), ""])
+    write_beside(folder / f"{name}.md", lambda file: file.write_text(text, encoding="utf-8"))
+    if any((run / PAGE).is_file() for run in runs):
+        from pipeline.artifacts.page import several  # a sweep of pages that nobody wrote waits for no template
+
+        several.write(folder / PAGE, title, runs, names, overrides)
 
 
 def _cells(row: Mapping[Any, Any], swept: Sequence[str]) -> list[str]:
