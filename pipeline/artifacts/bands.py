@@ -92,16 +92,17 @@ def bands(problem: Problem) -> tuple[Band, ...]:
     )
 
 
+def used(problem: Problem, e: Evaluation, band: Band) -> Closest:
+    """Where `e` uses most of the limits of one kind, at its knots."""
+    shares = band.used(e)
+    k, j = np.unravel_index(int(np.argmax(shares)), shares.shape)
+    low, high = band.lower[j], band.upper[j]
+    bound = f"{low:.4g} to {high:.4g}" if band.kind == "position" else f"{high:.4g}"
+    joint = problem.task.arm.description.actuated[j]
+    return Closest(band.kind, float(shares[k, j]), f"{bound} {band.units[j]}", joint, float(e.time[k]))
+
+
 def closest(problem: Problem, e: Evaluation) -> Closest | None:
-    """The limit of which `e` uses most at its knots; None where no joint has one."""
-    names, found = problem.task.arm.description.actuated, None
-    for band in bands(problem):
-        if not band.limited:
-            continue
-        used = band.used(e)
-        k, j = np.unravel_index(int(np.argmax(used)), used.shape)
-        if found is None or used[k, j] > found.share:
-            low, high = band.lower[j], band.upper[j]
-            bound = f"{low:.4g} to {high:.4g}" if band.kind == "position" else f"{high:.4g}"
-            found = Closest(band.kind, float(used[k, j]), f"{bound} {band.units[j]}", names[j], float(e.time[k]))
-    return found
+    """The limit of which `e` uses most; None where no joint has one."""
+    every = [used(problem, e, band) for band in bands(problem) if band.limited]
+    return max(every, key=lambda one: one.share, default=None)

@@ -18,43 +18,19 @@ from pipeline.artifacts import sweep
 from pipeline.artifacts.page import content, page
 from pipeline.artifacts.report import Report
 from pipeline.common.errors import OutputError
-from pipeline.config.run import RunConfig
 from pipeline.evaluation.evaluation import evaluate
-from pipeline.model.arm import Arm
-from pipeline.model.obstacles import Obstacles
-from pipeline.model.task import PositionTask
-from pipeline.path.curves import Line
-from pipeline.path.reference import Reference
-from pipeline.path.timing import RaisedCosine
-from pipeline.problem.limits import Limits
-from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Solution, Status, Trajectory
-from pipeline.robot.shapes import Shape
-from tests.reports import report_of
-from tests.support import with_shapes
+from tests.reports import MOVES as Q
+from tests.reports import TIMES, report_of, three_motions
 from tests.tasks import HUNG
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 TRIAL = Path(__file__).with_name("trial.js")  # what is tried in the page, and before it what watches for errors
-TIMES = np.linspace(0.0, 2.0, 5)
-Q = np.array([0.0, 0.3, -0.7]) + np.outer(np.linspace(0.0, 1.0, 5) ** 2, [0.4, -0.2, 0.1])
 
 
 @pytest.fixture(scope="module")
 def report() -> Report:
-    """Three motions of which one meets a singularity, among two solids and under one limit."""
-    arm = Arm(with_shapes("planar3r").description)
-    start = arm.position(Q[:1])[0, :2]
-    solids = (Shape("ball", "sphere", (0.05,), (0.2, 0.5, 0.0)), Shape("wall", "box", (0.1, 0.2, 0.3), (0.9, 0.0, 0.0)))
-    limits = replace(Limits.none(3), velocity=np.array([0.1, 9.0, np.inf]))
-    reference = Reference(Line(start, np.array([1.0, 0.0]), 0.1), RaisedCosine(2.0), tolerance=9.0)
-    problem = Problem(PositionTask(arm), reference, Q[0], TIMES, obstacles=Obstacles(solids, 0.02), limits=limits)
-    own = [
-        Solution("lsv", Trajectory(TIMES, Q), Status.SINGULAR, "met one", event_time=1.5),
-        Solution("global", Trajectory(TIMES, Q), Status.SOLVED, evidence="confirmed by IPOPT: well"),
-        Solution("global", Trajectory(TIMES, Q[:, [0, 2, 1]]), Status.SOLVED, optimum=2),
-    ]
-    return report_of(problem, [evaluate(problem, one) for one in own], settings=RunConfig(name="mine"))
+    return three_motions()
 
 
 @pytest.fixture(scope="module")

@@ -134,7 +134,7 @@ def _plane(report: Report, evaluations: Sequence[Evaluation]) -> dict[str, Any] 
         if table is not None and e.method == "pareto":
             row = table.loc[e.solution.optimum]
             marks = [mark for mark in ("extreme", "knee") if row[mark]]
-            good = row["status"] == "optimal"
+            good = bool(row["status"] == "optimal")
         x, y = (cost(e, name) for name in names)
         points.append({"motion": number, "x": x, "y": y, "mark": ", ".join(marks), "good": good})
     title = "Costs of the motions" if front is None else f"Pareto front, hypervolume {front.share:.3f}"

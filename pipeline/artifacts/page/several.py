@@ -55,8 +55,8 @@ def _plane(runs: Sequence[Mapping[str, Any]], words: Sequence[Mapping[str, str]]
             count += 1
     if not points:
         return None
-    x = "run, in the order of the table" if ordered else keys[0]
-    return {"title": "Costs of all runs", "x": x, "y": first, "step": False, "points": points}
+    across = "run, in the order of the table" if ordered else keys[0]
+    return {"title": "Costs of all runs", "x": across, "y": first, "step": False, "points": points}
 
 
 def _number(word: str) -> float | None:
