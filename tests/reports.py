@@ -43,7 +43,9 @@ def report_of(
 
 def leave_out_pictures(patch: pytest.MonkeyPatch) -> None:
     """Runs then draw and record nothing: that takes most of the time of a small one."""
-    kept = tuple(artifact for artifact in ARTIFACTS if name(artifact) not in ("page", "figures", "recording"))
+    kept = tuple(
+        artifact for artifact in ARTIFACTS if name(artifact) not in ("page", "figures", "recording", "animation")
+    )
     patch.setattr(run, "ARTIFACTS", kept)
 
 

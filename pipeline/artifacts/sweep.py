@@ -15,7 +15,6 @@ from omegaconf import OmegaConf
 from pipeline.common.files import write_beside
 from pipeline.common.markdown import markdown_table
 
-PAGE = "report.html"
 # Title in sweep.md, column of summary.csv, format, factor.
 NUMBERS = (
     ("kinetic energy [J s]", "kinetic_energy_integral", "{:.4g}", 1),
@@ -48,19 +47,19 @@ def exit_code(folder: Path) -> int:
 
 
 def write(folder: Path, runs: Sequence[Path] | None = None) -> None:
-    """sweep.csv, sweep.md and report.html in `folder`, of `runs` (None: all below it that left a summary)."""
+    """sweep.csv and sweep.md in `folder`, of `runs` (None: all below it that left a summary)."""
     if runs is None:
         runs = [file.parent for file in folder.glob("*/summary.csv")]
     if not runs:
         return
-    runs = sorted(runs, key=lambda run: _natural(run.name))
+    runs = in_order(runs)
     save(folder, "sweep", f"Sweep {folder.name}", runs, [run.name for run in runs])
     print(f"sweep table in {folder / 'sweep.md'}")
 
 
 def save(folder: Path, name: str, title: str, runs: Sequence[Path], names: Sequence[str]) -> None:
-    """The table of `runs`, called `names`, as `name`.csv and `name`.md, and the page over all of them."""
-    overrides = _swept([_overrides(run) for run in runs])
+    """The table of `runs`, called `names`, as `name`.csv and `name`.md."""
+    overrides = swept_by(runs)
     parts = []
     for run, called, own in zip(runs, names, overrides, strict=True):
         part = _summary(run)
@@ -75,10 +74,16 @@ def save(folder: Path, name: str, title: str, runs: Sequence[Path], names: Seque
     rows += [_cells(row, swept) for row in table.to_dict("records")]
     text = "\n".join([f"# {title}", "", *markdown_table(rows), "", *(f"- {note}" for note in notes), ""])
     write_beside(folder / f"{name}.md", lambda file: file.write_text(text, encoding="utf-8"))
-    if any((run / PAGE).is_file() for run in runs):
-        from pipeline.artifacts.page import several  # a sweep of pages that nobody wrote waits for no template
 
-        several.write(folder / PAGE, title, runs, names, overrides)
+
+def in_order(runs: Sequence[Path]) -> list[Path]:
+    """As they were run: 2 before 10."""
+    return sorted(runs, key=lambda run: _natural(run.name))
+
+
+def swept_by(runs: Sequence[Path]) -> list[dict[str, str]]:
+    """What the command line said for each run that it did not say for all of them."""
+    return _swept([_overrides(run) for run in runs])
 
 
 def _cells(row: Mapping[Any, Any], swept: Sequence[str]) -> list[str]:

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from pipeline.artifacts import sweep
-from pipeline.artifacts.page import content, page
+from pipeline.artifacts.page import content, page, several
 from pipeline.artifacts.report import Report
 from pipeline.common.errors import OutputError
 from pipeline.evaluation.evaluation import evaluate
@@ -109,14 +109,10 @@ def test_a_sweep_has_a_page_over_its_runs(report: Report, folder: Path) -> None:
         (own / ".hydra").mkdir(parents=True, exist_ok=True)
         (own / ".hydra" / "overrides.yaml").write_text(f"- path.length=0.{number + 1}\n", encoding="utf-8")
         if number < 2:
-            shutil.copy(folder / "report.html", own / "report.html") if number else None
+            (own / "report.html").write_bytes((folder / "report.html").read_bytes())
         sweep.write_failure(own, "made for a test")
-    sweep.save(
-        folder.parent,
-        "sweep",
-        "Sweep",
-        [folder.with_name(name) for name in ("0_first", "1_second", "2_bad")],
-        list("abc"),
+    several.write(
+        folder.parent, "Sweep", [folder.with_name(name) for name in ("0_first", "1_second", "2_bad")], list("abc")
     )
     text = (folder.parent / "report.html").read_text(encoding="utf-8")
     runs = page.read(folder.parent)

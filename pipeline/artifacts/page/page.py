@@ -14,10 +14,10 @@ from jinja2 import Environment, FileSystemLoader
 
 from pipeline.artifacts.page import content
 from pipeline.artifacts.report import Report
-from pipeline.artifacts.sweep import PAGE
 from pipeline.common.errors import OutputError
 from pipeline.common.files import write_beside
 
+PAGE = "report.html"
 HERE = Path(__file__).parent
 # uPlot, 44 kB: a package that ships it is installed with this one; nothing of it is imported, the file is read.
 SHIPS_UPLOT, UPLOT = "metaflow-card-uplot", "metaflow_extensions/card_uplot/plugins/cards/uplot/uplot"

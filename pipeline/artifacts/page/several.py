@@ -7,16 +7,15 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from pipeline.artifacts.page.page import read, save
-from pipeline.artifacts.sweep import PAGE
+from pipeline.artifacts.page.page import PAGE, read, save
+from pipeline.artifacts.sweep import swept_by
 
 MOST = 24  # runs whose motions the page holds; of more it says so
 
 
-def write(
-    file: Path, title: str, runs: Sequence[Path], names: Sequence[str], words: Sequence[Mapping[str, str]]
-) -> None:
-    """The page of the runs in these folders, if any has left a page: names, and what differed, for each of them."""
+def write(folder: Path, title: str, runs: Sequence[Path], names: Sequence[str]) -> None:
+    """report.html in `folder` of the runs in these folders, called `names`, if any of them has left a page."""
+    words = swept_by(runs)
     there = [number for number, run in enumerate(runs) if (run / PAGE).is_file()]
     shown, content = there[:MOST], []
     for number in shown:
@@ -32,7 +31,7 @@ def write(
         notes.append(
             f"The first {len(shown)} of {len(there)} runs are shown; each has a page of its own in its folder."
         )
-    save(file, title, content, plane=_plane(content, [words[number] for number in shown]), notes=notes)
+    save(folder / PAGE, title, content, plane=_plane(content, [words[number] for number in shown]), notes=notes)
 
 
 def _plane(runs: Sequence[Mapping[str, Any]], words: Sequence[Mapping[str, str]]) -> dict[str, Any] | None:
