@@ -104,9 +104,6 @@ class Nothing(Result):
             "export.force=true writes the cheapest all the same."
         ]
 
-    def said(self) -> list[str]:
-        return self.section()
-
     def facts(self) -> Mapping[str, Any]:
         return {"refused": {f"{motion.method} {motion.optimum}": list(motion.faults) for motion in self.refused}}
 
