@@ -25,6 +25,7 @@ from pipeline.methods.global_planner.reasons import counted, no_feasible, no_opt
 from pipeline.methods.global_planner.smooth import freer, nothing, rough, smooth, splined, unserved
 from pipeline.methods.global_planner.starts import Starts
 from pipeline.methods.global_planner.timed import timed
+from pipeline.methods.global_planner.tube import exactly, loosened
 from pipeline.methods.method import WITH_TIMING, Context, Method
 from pipeline.model.kinematics import wrap
 from pipeline.problem.limits import LIMIT_KINDS
@@ -57,7 +58,9 @@ HOPELESS = 0.1  # relative violation on a coarse grid from which on finer ones a
 def solve(problem: Problem, options: GlobalOptions, context: Context) -> list[Solution]:
     """The distinct optima found from these starts, best first."""
     if not splined(problem, options):
-        return by_differences(problem, options, context)
+        if problem.reference.exact:
+            return by_differences(problem, options, context)
+        return loosened(problem, by_differences(exactly(problem), options, context), options, context)
     found = by_differences((freer if problem.free_timing else rough)(problem), options, context)
     if not found[0].found and problem.constrained and not problem.free_timing:
         found = max(found, by_differences(freer(problem), options, context), key=lambda motions: motions[0].found)
