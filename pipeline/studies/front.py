@@ -19,7 +19,7 @@ from pipeline.studies.study import Motions, Result
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-DURATION = "duration"  # beside the integrals
+DURATION, TOLERANCE = "duration", "path_tolerance"  # beside the integrals
 EQUAL = 1e-6  # relative: costs closer than this are the same
 FEW = 4  # motions between the extremes that figures show one by one
 
@@ -40,7 +40,7 @@ class Front(Result):
     @property
     def objectives(self) -> list[str]:
         """The two integrals that are traded, in the order of the table's columns."""
-        return [column for column in self.table.columns if column == DURATION or column in INTEGRALS]
+        return [column for column in self.table.columns if column in (DURATION, TOLERANCE, *INTEGRALS)]
 
     @property
     def share(self) -> float:
@@ -115,13 +115,15 @@ def table(front: Sequence[Evaluation]) -> pd.DataFrame:
 
 
 def cost(motion: Evaluation, name: str) -> float:
-    """What `motion` costs by one of the integrals, or its duration [s]."""
-    return float(motion.time[-1]) if name == DURATION else motion.integral(name)
+    """What `motion` costs by one of the integrals; its duration [s]; or its largest distance from the path [m]."""
+    own = {DURATION: float(motion.time[-1]), TOLERANCE: motion.tracking_error_between}
+    return own[name] if name in own else motion.integral(name)
 
 
 def label(name: str) -> str:
     """Of an axis, with its unit."""
-    return "motion time [s]" if name == DURATION else f"{INTEGRALS[name].label} [{INTEGRALS[name].unit}]"
+    own = {DURATION: "motion time [s]", TOLERANCE: "largest distance from the path [m]"}
+    return own[name] if name in own else f"{INTEGRALS[name].label} [{INTEGRALS[name].unit}]"
 
 
 def dominated(values: Array) -> Array:
@@ -194,6 +196,9 @@ def draw(front: Front, name: str) -> Figure:
         ylabel=label(y),
         title=f"{name}: Pareto front, hypervolume {front.share:.3f} of the extremes' rectangle",
     )
+    for name, scale in ((x, axes.set_xscale), (y, axes.set_yscale)):
+        if name == TOLERANCE:  # from a motion on its path to one that is as far off as it may be
+            scale("log")
     axes.grid(True, color="0.93")
     axes.set_axisbelow(True)
     axes.legend(fontsize=9)

@@ -7,23 +7,29 @@ from functools import cache
 
 import numpy as np
 import pytest
+from pydrake.math import RollPitchYaw, RotationMatrix
+from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 from pipeline.build.problem import prepare
 from pipeline.common.arrays import Array
 from pipeline.config.methods import LsvOptions
 from pipeline.evaluation.evaluation import Evaluation, evaluate
-from pipeline.evaluation.free_body import BasePlant, FreeMotion, integrate
+from pipeline.evaluation.free_body import BasePlant, FreeMotion, integrate, reactions
 from pipeline.methods.global_planner.planner import global_planner
 from pipeline.methods.lsv import inertia_weighted, lsv
 from pipeline.methods.method import Context
 from pipeline.methods.pmke.predictive import pmke
 from pipeline.methods.registry import METHODS
+from pipeline.model.arm import Arm
+from pipeline.model.coordinates import SPACE
+from pipeline.model.floating import Floating
 from pipeline.problem.costs import integrals
 from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Solution, Status, Trajectory
 from pipeline.program.feasibility import least_violation, violations
-from tests.support import composed
+from pipeline.robot.spacecraft import Spacecraft
+from tests.support import composed, robot, within_limits
 
 SIZES = ("starts=population", "configurations=8", "candidates=100", "optimised=2", "refine_to=null")
 FEW = tuple(f"method.global.{key}" for key in SIZES)
@@ -95,6 +101,10 @@ def test_the_path_error_is_of_second_order_in_the_step() -> None:
         joints = solution.trajectory.q[:, problem.task.arm.joints]
         found = integrate(problem, solution.trajectory.time, joints)
         errors.append(found.path_error)
+        moved = CubicSpline(solution.trajectory.time, joints)(found.time)
+        tip = found.position + found.rotation.apply(problem.task.arm.on_fixed_base.position(moved))
+        off = np.linalg.norm(tip[:, :2] - problem.reference.position(found.time), axis=1)
+        assert found.path_error == pytest.approx(off.max(), rel=1e-9)
     order = np.log2(np.array(errors[:-1]) / errors[1:])
     assert errors[-1] < 5e-6
     assert np.all((order > 1.8) & (order < 2.4)), order
@@ -113,6 +123,20 @@ def test_a_base_that_was_moved_is_noticed() -> None:
     assert spoiled.base.floating is not None
     assert honest.base.floating is not None
     assert spoiled.base.floating.path_error == pytest.approx(honest.base.floating.path_error)
+
+
+def test_a_craft_has_its_mass_where_it_is_said_to_be() -> None:
+    """In the root link's frame, which stands turned."""
+    where, moments = (0.05, -0.02, 0.1), []
+    for com in (where, (0.0, 0.0, 0.0)):
+        craft = Spacecraft(20.0, ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), com)
+        fixed = robot("panda", base_rpy=(0.3, -0.4, 0.5))
+        free = BasePlant(Arm(fixed.description, fixed.mounting, Floating(craft, SPACE)))
+        free.at(np.zeros(3), free.start[0], np.zeros(7), np.zeros(13))
+        mass = free.plant.CalcTotalMass(free.context)
+        moments.append(mass * free.plant.CalcCenterOfMassPositionInWorld(free.context))
+    turned = RotationMatrix(RollPitchYaw(0.3, -0.4, 0.5)).matrix()
+    np.testing.assert_allclose(moments[0] - moments[1], 20.0 * turned @ where, atol=1e-12)
 
 
 def test_the_turn_is_from_the_start_on() -> None:
@@ -269,6 +293,23 @@ def test_reactions_are_the_rate_of_momentum(rng: np.random.Generator) -> None:
             plant.at(position, rotation, q, np.concatenate([np.zeros(6), qd]))
             sides.append(plant.momentum())
         np.testing.assert_allclose(e.base.reaction[i], (sides[0] - sides[1]) / (2 * h), atol=1e-7)
+
+
+def test_an_arm_at_rest_pulls_at_its_base_by_its_weight(rng: np.random.Generator) -> None:
+    """Placed and turned: the weight of all its bodies, and its moment about the root link."""
+    where, gravity = (0.3, -0.2, 0.5), np.array([0.5, -1.0, -9.5])
+    arm = robot("panda", base_position=where, base_rpy=(0.3, -0.4, 0.5), gravity=tuple(gravity))
+    q, plant = within_limits(arm, 2, rng), BasePlant(arm)
+    np.testing.assert_allclose(
+        Rotation.from_quat(plant.start[0]).as_matrix(),
+        RotationMatrix(RollPitchYaw(0.3, -0.4, 0.5)).matrix(),
+        atol=1e-15,
+    )
+    for row, found in zip(q, reactions(arm, q, 0 * q, 0 * q), strict=True):
+        plant.at(np.array(where), plant.start[0], row, np.zeros(6 + arm.n))
+        weight = plant.plant.CalcTotalMass(plant.context) * gravity
+        lever = plant.plant.CalcCenterOfMassPositionInWorld(plant.context) - where
+        np.testing.assert_allclose(found, -np.concatenate([weight, np.cross(lever, weight)]), atol=1e-10)
 
 
 @pytest.mark.slow
