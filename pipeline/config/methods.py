@@ -103,7 +103,15 @@ class RecedingOptions:
         Whole,
         Field(ge=0, le=1000, description="coarse knots from the horizon to the end of the path, against dead ends"),
     ] = 8
-    tolerance: Annotated[Positive, Field(description="of a prediction, relative to its objective")] = 1e-8
+    real_time_iterations: Annotated[
+        Annotated[Whole, Field(ge=1, le=1000)] | None,
+        Field(description="quadratic programs of every update; null: as many as it takes"),
+    ] = None
+    confirm: Annotated[
+        Literal["every", "last", "none"],
+        Field(description="which windows ipopt checks, after the motion: every one; last: a sample of ten; none"),
+    ] = "last"
+    tolerance: Annotated[Positive, Field(description="of the predictions by ipopt, relative to their objective")] = 1e-8
 
 
 @schema
