@@ -84,6 +84,7 @@ def histogram(axes: Axes, times: Times, color: str) -> None:
         1e3 * times.deadline, color="#C53030", linestyle=(0, (4, 3)), label=f"deadline {1e3 * times.deadline:.4g} ms"
     )
     axes.set_xscale("log")
+    axes.locator_params(axis="y", integer=True)
     axes.set_ylabel("Updates")
     axes.grid(color="#E2E8F0", linewidth=0.7)
     axes.set_axisbelow(True)

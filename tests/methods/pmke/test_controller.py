@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -15,6 +16,7 @@ from pipeline.methods.pmke.predictive import pmke
 from pipeline.problem.limits import Limits
 from pipeline.problem.objective import Objective
 from pipeline.problem.problem import Problem
+from tests.support import ROOT
 
 Make = Callable[[int, int], Problem]
 PERIOD = 0.05
@@ -64,6 +66,13 @@ def test_nothing_is_raised_in_the_loop_and_the_arm_is_held(problem: Make, monkey
     assert any(command.status.startswith("no prediction: ") for command in later)
     away = controller.update(31 * PERIOD, controller.q + 0.3, np.zeros(3))
     assert away.status == "begins anew: 0.3 rad from the reference" or away.status.startswith("no prediction")
+
+
+def test_the_guides_example_runs(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.chdir(ROOT)
+    (example,) = re.findall(r"```python\n(.*?)```", (ROOT / "docs/guide/control.md").read_text(encoding="utf-8"), re.S)
+    exec(compile(example, "control.md", "exec"), {})
+    assert re.match(r"(follows|predicts) \[", capsys.readouterr().out)
 
 
 def test_an_arm_that_was_pushed_goes_on_from_where_it_is(problem: Make) -> None:
