@@ -55,6 +55,7 @@ def test_a_push_and_a_stall_are_seen_and_made_good() -> None:
     assert "back at the end" in loop.section()[0]
 
 
+@pytest.mark.slow
 def test_weak_motors_are_at_their_limits() -> None:
     assert loop_of("limits=joint_torque_power", "limits.torque=2e-5", "limits.power=null").at_limit.mean() > 0.1
 
