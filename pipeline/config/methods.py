@@ -78,9 +78,9 @@ class PmkeOptions:
     update_interval: Annotated[Positive, Field(description="[s] between predictions (I)")] = 0.5
     objective: Prediction = "problem"
     interpolation: Annotated[
-        Literal["quintic", "cubic"],
-        Field(description="through the predicted knots; quintic: as the paper's end conditions need"),
-    ] = "quintic"
+        Literal["quartic", "quintic", "cubic"],
+        Field(description="through the predicted knots; quartic: the paper's, with a knot inside each interval"),
+    ] = "quartic"
     gain: Gain = 0.0
     project: Annotated[
         Switch, Field(description="whether every step is put back onto the path, which leaves no drift; without gain")
@@ -133,7 +133,7 @@ class GlobalOptions:
         Literal["differences", "spline"] | None,
         Field(
             description="differences: backward, as in the papers; spline: a smooth curve that keeps its limits between "
-            "the knots too; null: spline where boundary.rest, limits.acceleration or limits.jerk ask for it"
+            "the knots too; null: spline where boundary.rest, limits of acceleration or jerk, or an obstacle ask for it"
         ),
     ] = None
     nodes: Annotated[Whole, Field(ge=8, le=10_000, description="of the roadmap, in each layer")] = 300
@@ -271,8 +271,11 @@ class ParetoOptions:
         Literal["epsilon_constraint", "weighting"], Field(description="how the points between the extremes are found")
     ] = "epsilon_constraint"
     objectives: Annotated[
-        Words[Literal[Integral, "duration"]],
-        Field(description="the two integrals; duration and one of them: the law is free (timing=optimal)"),
+        Words[Literal[Integral, "duration", "path_tolerance"]],
+        Field(
+            description="the two integrals; duration and one of them: the law is free (timing=optimal); path_tolerance "
+            "and one of them: the path need not be kept exactly (path.exact=false)"
+        ),
     ] = ("kinetic_energy", "torque")
     steps: Annotated[Whole, Field(ge=2, le=10_000, description="of each of the two directions")] = 10
     rounds: Annotated[Whole, Field(ge=0, le=1000, description="of starts from both neighbours, at most")] = 3

@@ -21,18 +21,26 @@ def limit_excess(
     *,
     qdd: Array = STILL,
     jerk: Array = STILL,
+    pace: Array | None = None,
 ) -> dict[str, float]:
     """By how much each kind of limit is exceeded, relative to its size (positions: to half the range; clearances: to
-    the margin); <= 0 if kept. turn [rad]: of the base from its start.
+    the margin); <= 0 if kept. turn [rad]: of the base from its start; pace (K, 2): of the tool, [m/s] and [m/s^2].
     """
-    if not problem.constrained or not np.all(np.isfinite(q)):
+    if not (problem.constrained or problem.bounds.limits_tool) or not np.all(np.isfinite(q)):
         return {}
     found = {kind: float(excess.max()) for kind, excess in excesses(problem, q, qd, tau, qdd, jerk).items()}
     if problem.obstacles is not None:
         found["clearance"] = 1 - clearance / problem.obstacles.margin
     if np.isfinite(problem.bounds.attitude):
         found["attitude"] = turn / problem.bounds.attitude - 1
-    return found
+    return found | {kind: float(excess.max()) for kind, excess in of_tool(problem, pace).items()}
+
+
+def of_tool(problem: Problem, pace: Array | None) -> dict[str, Array]:
+    """The same (K,) of the limits of its pace (K, 2), where it has any."""
+    bounds = {"tool_speed": problem.bounds.tool_speed, "tool_acceleration": problem.bounds.tool_acceleration}
+    limited = {kind: (own, bound) for own, (kind, bound) in enumerate(bounds.items()) if np.isfinite(bound)}
+    return {} if pace is None else {kind: pace[:, own] / bound - 1 for kind, (own, bound) in limited.items()}
 
 
 def excesses(

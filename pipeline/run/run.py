@@ -8,7 +8,6 @@ from typing import Any
 
 from pipeline.artifacts.artifacts import ARTIFACTS, name, write
 from pipeline.artifacts.report import Report
-from pipeline.artifacts.summary import summary
 from pipeline.common.versions import versions
 from pipeline.common.workers import Workers
 from pipeline.config.run import RunConfig
@@ -40,7 +39,7 @@ def run(config: RunConfig, folder: Path) -> int:
     with stages("studies"):
         results = tuple(result for study in STUDIES if (result := study(motions)) is not None)
     report = Report(motions, results, seconds, stages.seconds, made)
-    console.report(summary(report), results)
+    console.report(report)
     for artifact in ARTIFACTS:
         with stages(name(artifact)):
             write(artifact, report, folder)

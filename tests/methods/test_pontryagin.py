@@ -8,6 +8,7 @@ import pytest
 
 from pipeline.build.problem import prepare
 from pipeline.common.errors import InputError
+from pipeline.config.compose import experiment
 from pipeline.config.methods import (
     CalculusOfVariationsOptions,
     GlobalOptions,
@@ -22,6 +23,7 @@ from pipeline.methods.pontryagin.as_printed import pontryagin_as_printed
 from pipeline.methods.pontryagin.boundary_value import pontryagin
 from pipeline.methods.pontryagin.conditions import rates
 from pipeline.model.kinematics import pseudoinverse
+from pipeline.problem.costs import objective_values
 from pipeline.problem.lagrangian import Lagrangian
 from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Solution, Status
@@ -144,6 +146,16 @@ def test_extremals_and_their_kinds_agree_with_the_calculus_of_variations() -> No
     for one, other in zip(stationary, found, strict=True):
         assert one.statistics["integral"] == pytest.approx(other.statistics["integral"], rel=1e-8)
         assert one.statistics["index"] == other.statistics["index"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("case", "minima"), [("case3", (25.3491, 63.158)), ("case4a", (-507.363, -421.171))])
+def test_the_planner_lists_both_minima(case: str, minima: tuple[float, float]) -> None:
+    """Their values: docs/errata.md, by shooting and by collocation."""
+    config = experiment(case, "timing.steps=100", "method.global.starts=dynamic_programming")
+    found = global_planner(prepare(config), config.method.of("global"))
+    costs = [objective_values(prepare(config), s.trajectory.time, s.trajectory.q[None])[0] for s in found]
+    np.testing.assert_allclose(costs, minima, rtol=2e-3)
 
 
 @pytest.mark.slow

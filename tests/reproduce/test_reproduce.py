@@ -28,6 +28,16 @@ def test_every_verdict_is_recomputed(reproduced: Path) -> None:
     differing = [(one, other[3]) for one, other in zip(expected(), found, strict=True) if one != other]
     assert differing == []
     assert np.isfinite(table["recomputed"]).all()
+    assert counts(table) == {"reproduced": 37, "better": 4, "misprint": 5, "differs": 33}
+    assert counts(table, derived=True) == {"reproduced": 5, "better": 0, "misprint": 0, "differs": 9}
+
+
+@pytest.mark.slow
+def test_nedungadis_motions_from_the_planners_configurations(reproduced: Path) -> None:
+    """Mean joint differences beside an audit's in another code, which gives so many digits."""
+    table = runs_in(reproduced)["sim1_validation"].table("validation").set_index("planner_optimum")
+    found = table.loc[[1, 2, 4], "difference_from_planner_start"]
+    np.testing.assert_allclose(found, [0.0068, 0.0234, 0.0126], atol=6e-5)
 
 
 @pytest.mark.slow

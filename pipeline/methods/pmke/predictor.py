@@ -61,7 +61,7 @@ class Predictor:
         self.exact = None if self.why_not else ExactWindow(self.lagrangian, self.horizon, self.step)
         self.program = None if self.lifted or alone else Window(self.lagrangian, self.horizon, self.step)
         self.times = self.step * np.arange(self.horizon + 1)
-        self.degree = 5 if options.interpolation == "quintic" else 3
+        self.degree = {"cubic": 3, "quartic": 4, "quintic": 5}[options.interpolation]
         self.spline = _splines(self.times, self.degree)
         self.previous: tuple[float, Array] | None = None
         self.solved: list[tuple[Array, Array, Array]] = []  # windows by Newton's method: q, x_ref, knots ahead
@@ -187,10 +187,7 @@ class Predictor:
         return np.array([np.interp(ahead, self.times, column) for column in points.T]).T
 
     def _interpolate(self, now: float, points: Array, qd: Array, qdd: Array) -> BSpline:
-        """Step 6: value, velocity (and acceleration) matched at the start, zero at the end.
-
-        Four end conditions beside the points ask for degree 5; the paper says '4th order spline'.
-        """
+        """Step 6: value, velocity (and acceleration) matched at the start, zero at the end."""
         knots, by_points, by_qd, by_qdd = self.spline
         coefficients = by_points @ points + by_qd[:, None] * qd
         if by_qdd is not None:
@@ -201,14 +198,26 @@ class Predictor:
 
 def _splines(times: Array, degree: int) -> tuple[Array, Array, Array, Array | None]:
     """The knots of the interpolating spline on `times` (h + 1,), and its coefficients by the points (C, h + 1), by the
-    velocity and, for degree 5, by the acceleration at the start (C,).
+    velocity and, for degrees 4 and 5, by the acceleration at the start (C,).
     """
     count = len(times)
     units = np.eye(count + 2)
     zero = np.zeros(count + 2)
     ends: tuple[Any, Any] = ([(1, units[count])], [(1, zero)])
-    if degree == 5:
+    if degree > 3:
         ends = ([(1, units[count]), (2, units[count + 1])], [(1, zero), (2, zero)])
-    spline = make_interp_spline(times, units[:count], k=degree, bc_type=ends)
+    knots = _quartic_knots(times) if degree == 4 else None
+    spline = make_interp_spline(times, units[:count], k=degree, t=knots, bc_type=ends)
     by_points, by_qd, by_qdd = spline.c[:, :count], spline.c[:, count], spline.c[:, count + 1]
-    return spline.t, by_points, by_qd, by_qdd if degree == 5 else None
+    return spline.t, by_points, by_qd, by_qdd if degree > 3 else None
+
+
+def _quartic_knots(times: Array) -> Array:
+    """Of the spline of degree 4 through points at times (h + 1,) that meets four end conditions more: (h + 10,).
+
+    One knot inside for each interval, at the mean of four conditions' times in a row: de Boor, A Practical Guide to
+    Splines, ch. XIII. For h = 2 these are 3/8 and 5/8 of the window, 0.75 and 1.25 s of the paper's 2 s.
+    """
+    conditions = np.concatenate([[times[0]] * 2, times, [times[-1]] * 2])
+    inside = np.convolve(conditions[1:-1], np.full(4, 0.25), "valid")
+    return np.concatenate([[times[0]] * 5, inside, [times[-1]] * 5])

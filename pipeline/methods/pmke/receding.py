@@ -17,7 +17,7 @@ from __future__ import annotations
 import time as clock
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
@@ -120,8 +120,11 @@ def _first_plan(problem: Problem, objective: Objective) -> tuple[Callable[[Array
     """The whole motion on a coarse grid, as the global planner finds it; or None, and why there is none."""
     times = np.linspace(0.0, problem.reference.duration, PLAN_INTERVALS + 1)
     whole = replace(problem, times=times, objective=objective, boundary=Boundary.FIXED)
+    # By differences as the windows are, unless accelerations are limited, of which those programs know nothing.
+    form: Literal["differences"] | None = None if problem.bounds.smooth else "differences"
     for starts in FIRST_STARTS:
-        first = global_planner(whole, GlobalOptions(optimised=starts, budget=starts, refine_to=None))[0]
+        options = GlobalOptions(transcription=form, optimised=starts, budget=starts, refine_to=None)
+        first = global_planner(whole, options)[0]
         if first.found:
             return _through(times, first.trajectory.q), ""
     return None, first.message

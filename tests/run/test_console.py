@@ -1,0 +1,26 @@
+"""What stands on the terminal, on a narrow one too."""
+
+from __future__ import annotations
+
+import io
+
+import pytest
+from rich.console import Console as RichConsole
+
+from pipeline.run.console import Console
+from tests.reports import three_motions
+
+
+@pytest.mark.parametrize("width", [60, 80, 140])
+def test_the_verdict_comes_first_and_the_table_fits(width: int) -> None:
+    console, said = Console(), io.StringIO()
+    console.console = RichConsole(file=said, width=width, highlight=False)
+    console.report(three_motions())
+    text = said.getvalue()
+    assert text.startswith("Best found: global 1: ")
+    head = next(line for line in text.splitlines() if line.startswith("motion"))
+    assert "energy [J s]" in head  # a unit is no markup
+    assert ("torque² [N² m² s]" in head) == (width == 140)
+    assert "…" not in text
+    assert max(map(len, text.split("lsv: met one")[0].splitlines())) <= width
+    assert "global: confirmed by IPOPT: well" in text
