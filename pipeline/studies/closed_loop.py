@@ -119,9 +119,10 @@ class NotRun(Result):
 
 def study(motions: Motions) -> Result | None:
     """Where it is asked for."""
-    config, motion = motions.config.closed_loop, chosen(motions)
+    config = motions.config.closed_loop
     if not config.run:
         return None
+    motion = chosen(motions)
     return NotRun() if motion is None else simulate(motion.solution.posed(motions.problem), motion, config)
 
 
