@@ -35,7 +35,7 @@ from pipeline.studies import style
 
 POSES = 12  # of the stroboscopic picture
 SOLID = 110  # opacity of the arms, of 255: those behind must shine through
-REFERENCE = (190, 190, 190)
+REFERENCE = (226, 170, 203)  # the colour that paths have in every picture, mixed with white
 OBSTACLE = (200, 70, 60, 255)
 
 
