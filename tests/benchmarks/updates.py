@@ -84,7 +84,8 @@ def trajectory(name: str, repeats: int = REPEATS, *overrides: str) -> None:
     ratio = np.median(np.array(ours) / np.array(theirs))
     print(
         f"{name:<8} {np.median(ours):9.3f} {np.median(theirs):9.3f} {ratio:7.2f} {np.median(alone_ms):9.3f}   "
-        f"{len(updates)} updates; costs agree to {gap:.0e}, integrals to {abs(integral / confirmed - 1):.0e} of {confirmed:.6g} J s"
+        f"{len(updates)} updates; costs agree to {gap:.0e}, "
+        f"integrals to {abs(integral / confirmed - 1):.0e} of {confirmed:.6g} J s"
     )
 
 
