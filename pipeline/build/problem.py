@@ -6,7 +6,7 @@ from pipeline.build import base
 from pipeline.build.checks import check_problem, require_reach
 from pipeline.build.goal import make_limits, make_objective, make_obstacles
 from pipeline.build.path import make_knots, make_reference, make_task
-from pipeline.build.rest import check_rest
+from pipeline.build.rest import check_rest, ends_at_rest
 from pipeline.build.robot import initial, load
 from pipeline.build.tool import check_tool
 from pipeline.config.run import RunConfig
@@ -27,17 +27,17 @@ def prepare(config: RunConfig) -> Problem:
     if config.timing.law == "from_file":
         refuse_endless(config, reference.duration, "path.file, which takes ")
     free_law, free_duration = config.timing.law == "optimal", config.timing.duration == "shortest"
-    found = free_law or free_duration  # from rest to rest
+    rest = ends_at_rest(config, reference)
     problem = Problem(
         task,
         reference,
         q_init,
         make_knots(config.timing, reference.duration),
         objective=make_objective(config, arm),
-        limits=make_limits(config.limits, arm),
+        limits=make_limits(config.limits, arm, config.robot.limits if any(rest) else None),
         boundary=Boundary(config.boundary.kind),
         obstacles=make_obstacles(config.obstacles, arm),
-        rest=(found or "start" in config.boundary.rest, found or "end" in config.boundary.rest),
+        rest=rest,
         zero_acceleration=config.boundary.zero_acceleration,
         free_law=free_law,
         free_duration=free_duration,

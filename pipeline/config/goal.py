@@ -149,10 +149,12 @@ class BoundaryConfig:
         Field(description="fixed: starts at robot.q_init; free: anywhere on its manifold; cyclic: ends as it began"),
     ] = "fixed"
     rest: Annotated[
-        tuple[Literal["start", "end"], ...],
-        AfterValidator(once),
-        Field(description="at which ends all joints rest, so that the motion can be sent to a robot"),
-    ] = ()
+        Annotated[tuple[Literal["start", "end"], ...], AfterValidator(once)] | None,
+        Field(
+            description="at which ends all joints rest, so that the motion can be sent to a robot; null: at both, but "
+            "for the arms in robots/, moving bases, paths that are entered at speed, and runs without the method global"
+        ),
+    ] = None
     zero_acceleration: Annotated[
         Switch, Field(description="whether they do not accelerate there either, as limits of jerk need")
     ] = False

@@ -71,9 +71,9 @@ class PmkeOptions:
     update_interval: Annotated[Positive, Field(description="[s] between predictions (I)")] = 0.5
     objective: Prediction = "problem"
     interpolation: Annotated[
-        Literal["quintic", "cubic"],
-        Field(description="through the predicted knots; quintic: as the paper's end conditions need"),
-    ] = "quintic"
+        Literal["quartic", "quintic", "cubic"],
+        Field(description="through the predicted knots; quartic: the paper's, with a knot inside each interval"),
+    ] = "quartic"
     gain: Gain = 0.0
     tolerance: Annotated[Positive, Field(description="of a prediction, relative to its energy")] = 1e-8
     singular_value: Singular = 0.03
@@ -114,7 +114,7 @@ class GlobalOptions:
         Literal["differences", "spline"] | None,
         Field(
             description="differences: backward, as in the papers; spline: a smooth curve that keeps its limits between "
-            "the knots too; null: spline where boundary.rest, limits.acceleration or limits.jerk ask for it"
+            "the knots too; null: spline where boundary.rest, limits of acceleration or jerk, or an obstacle ask for it"
         ),
     ] = None
     nodes: Annotated[Whole, Field(ge=8, le=10_000, description="of the roadmap, in each layer")] = 300

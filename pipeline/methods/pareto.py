@@ -75,6 +75,7 @@ def solve(problem: Problem, options: ParetoOptions, context: Context) -> list[So
         return duration_front.solve(problem, options, context)
     if tolerance_front.TOLERANCE in options.objectives:
         return tolerance_front.solve(problem, options, context)
+    options = _by_differences(options)
     while True:
         solutions = _front(problem, options, context)
         time = solutions[0].trajectory.time
@@ -83,6 +84,12 @@ def solve(problem: Problem, options: ParetoOptions, context: Context) -> list[So
         if times is None:
             return solutions
         problem = replace(problem, times=times)
+
+
+def _by_differences(options: ParetoOptions) -> ParetoOptions:
+    """The points of a front are by differences, and so are the planner's motions unless a spline is asked for."""
+    planner = options.planner
+    return replace(options, planner=replace(planner, transcription=planner.transcription or "differences"))
 
 
 def _front(problem: Problem, options: ParetoOptions, context: Context) -> list[Solution]:
@@ -141,7 +148,7 @@ def refuses(problem: Problem, options: ParetoOptions) -> str | None:
     if why := ON_KNOTS.why_not(problem):
         return why
     each = (replace(problem, objective=Objective({name: 1.0})) for name in options.objectives)
-    return next((why for own in each if (why := global_planner.why_not(own, options.planner))), None)
+    return next((why for own in each if (why := global_planner.why_not(own, _by_differences(options).planner))), None)
 
 
 pareto = Method("pareto", "Pareto point", "#2F855A", ParetoOptions, WITH_TIMING, solve, refuses)

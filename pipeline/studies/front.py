@@ -80,7 +80,7 @@ def table(front: Sequence[Evaluation]) -> pd.DataFrame:
     statistics = front[0].solution.statistics
     rows = pd.DataFrame(statistics["front"])
     names = statistics["objectives"]
-    costs = {e.solution.optimum: {name: _value(e, name) for name in names} for e in front}
+    costs = {e.solution.optimum: {name: cost(e, name) for name in names} for e in front}
     for name in names:
         rows[name] = [costs[point][name] if point in costs else np.nan for point in rows["point"]]
     bounded = [row[row["bounded"]] / row["bound"] - 1 if row["bounded"] else np.nan for row in rows.to_dict("records")]
@@ -114,12 +114,14 @@ def table(front: Sequence[Evaluation]) -> pd.DataFrame:
     ]
 
 
-def _value(motion: Evaluation, name: str) -> float:
+def cost(motion: Evaluation, name: str) -> float:
+    """What `motion` costs by one of the integrals; its duration [s]; or its largest distance from the path [m]."""
     own = {DURATION: float(motion.time[-1]), TOLERANCE: motion.tracking_error_between}
     return own[name] if name in own else motion.integral(name)
 
 
-def _label(name: str) -> str:
+def label(name: str) -> str:
+    """Of an axis, with its unit."""
     own = {DURATION: "motion time [s]", TOLERANCE: "largest distance from the path [m]"}
     return own[name] if name in own else f"{INTEGRALS[name].label} [{INTEGRALS[name].unit}]"
 
@@ -190,8 +192,8 @@ def draw(front: Front, name: str) -> Figure:
             arrowprops={"arrowstyle": "->"},
         )
     axes.set(
-        xlabel=_label(x),
-        ylabel=_label(y),
+        xlabel=label(x),
+        ylabel=label(y),
         title=f"{name}: Pareto front, hypervolume {front.share:.3f} of the extremes' rectangle",
     )
     for name, scale in ((x, axes.set_xscale), (y, axes.set_yscale)):

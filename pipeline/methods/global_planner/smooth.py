@@ -90,8 +90,11 @@ class Searches:
 
 
 def splined(problem: Problem, options: GlobalOptions) -> bool:
-    """Whether the motion is to be a spline: asked for by name, or by rest and limits that differences do not know."""
-    asks = any(problem.rest) or problem.bounds.smooth or problem.free_timing or not problem.reference.exact
+    """Whether the motion is to be a spline: asked for by name, by rest and limits that differences do not know, by a
+    tube, or by an obstacle, which is to be kept off between the knots too.
+    """
+    off = problem.obstacles is not None and why_not(problem) is None
+    asks = any(problem.rest) or problem.bounds.smooth or problem.free_timing or not problem.reference.exact or off
     return options.transcription == "spline" or (options.transcription is None and asks)
 
 
@@ -103,7 +106,7 @@ def unserved(problem: Problem, options: GlobalOptions) -> str | None:
     if any(problem.rest) or problem.bounds.smooth:
         return (
             "method.global.transcription = differences keeps neither boundary.rest nor limits.acceleration or "
-            "limits.jerk; set it to spline"
+            "limits.jerk; set it to spline, or boundary.rest=[] and no such limits"
         )
     return None
 
