@@ -9,7 +9,7 @@ from pipeline.artifacts.report import Report
 from pipeline.artifacts.verdict import baseline, saving, sent, status, weighs
 from pipeline.methods.registry import METHODS
 from pipeline.problem.integrals import INTEGRALS
-from pipeline.studies.front import cost
+from pipeline.studies.front import DURATION, Front, cost
 
 SHORT = {"kinetic_energy": "energy", "torque": "torque²", "velocity_norm": "velocity²"}  # for the heads of columns
 
@@ -18,13 +18,15 @@ def rows(report: Report) -> list[dict[str, str]]:
     """By title. A column in which no motion has anything to say is left out; every unit stands in its title."""
     problem, against, chosen = report.motions.problem, baseline(report), sent(report)
     main = weighs(problem)
-    names = [main, *(name for name in ("kinetic_energy", "torque") if name != main)]
+    front = report.find(Front)
+    names = list(dict.fromkeys([main, *(front.objectives if front is not None else ()), "kinetic_energy", "torque"]))
     table = []
     for e in report.motions.evaluations:
         row = {"motion": e.label, "status": status(e)}
         found = e.solution.found
         for name in names:
-            title = f"{SHORT.get(name, name.replace('_', ' '))} [{INTEGRALS[name].unit}]"
+            unit = "s" if name == DURATION else INTEGRALS[name].unit
+            title = f"{SHORT.get(name, name.replace('_', ' '))} [{unit}]"
             row[title] = f"{cost(e, name):.4g}" if found else ""
         if against is not None:
             known = found and e.solution.event_time is None and e is not against

@@ -11,7 +11,7 @@ from pipeline.common.workers import Workers
 from pipeline.problem.integrals import INTEGRALS
 from pipeline.problem.lagrangian import Lagrangian
 from pipeline.problem.problem import Boundary, Problem
-from pipeline.problem.solution import Progress, Solution, no_progress
+from pipeline.problem.solution import Progress, Solution, no_phase, no_progress
 
 ALL_BOUNDARIES = frozenset(Boundary)
 
@@ -105,11 +105,15 @@ ON_KNOTS = Serves(rest=False)  # by differences, which know no rest
 
 @dataclass(frozen=True)
 class Context:
-    """What a run shares with its methods: the seed of every random draw, the workers, and whom progress is told."""
+    """What a run shares with its methods: the seed of every random draw, the workers, and whom progress is told.
+
+    phase: told in a few words what begins.
+    """
 
     seed: int = 1
     workers: Workers = field(default_factory=Workers)
     progress: Progress = no_progress
+    phase: Callable[[str], None] = no_phase
 
 
 @dataclass(frozen=True)

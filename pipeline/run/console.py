@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 from rich.console import Console as RichConsole
@@ -17,6 +18,7 @@ from pipeline.artifacts.table import rows
 from pipeline.artifacts.verdict import verdict
 from pipeline.problem.solution import Progress
 
+Phase = Callable[[str], None]
 WORDS = ("motion", "status", "closest limit")
 WRAPPED = ("status",)
 SPARE = ("time [s]", "torque² [N² m² s]", "path error [m]", "closest limit")  # what a narrow console leaves out first
@@ -28,10 +30,10 @@ class Console:
         self.console = RichConsole(highlight=False)
 
     @contextmanager
-    def progress(self, name: str) -> Iterator[Progress]:
-        """A bar with the best cost so far; without a terminal, a plain line now and then."""
+    def progress(self, name: str) -> Iterator[tuple[Progress, Phase]]:
+        """A bar with the phase and the best cost so far; without a terminal, a line per phase and now and then."""
         if not self.console.is_terminal:
-            yield self._lines(name)
+            yield self._lines(name), partial(self.phase, name)
             return
         columns = (
             TextColumn(name),
@@ -41,12 +43,22 @@ class Console:
             TimeElapsedColumn(),
         )
         with Bar(*columns, console=self.console, transient=True) as bar:
-            task = bar.add_task("", total=None)
+            task, now = bar.add_task("", total=None), ""
 
             def show(done: int, total: int, best: float) -> None:
-                bar.update(task, completed=done, total=total, description=f"best {best:.5g}")
+                bar.update(task, completed=done, total=total, description=f"{now}, best {best:.5g}")
 
-            yield show
+            def begin(words: str) -> None:
+                nonlocal now
+                now = words
+                bar.update(task, description=words)
+
+            yield show, begin
+
+    def phase(self, name: str, words: str) -> None:
+        """What begins now: said where nobody sees a bar."""
+        if not self.console.is_terminal:
+            print(f"{name}: {words}", flush=True)
 
     def _lines(self, name: str) -> Progress:
         said = 0.0

@@ -66,7 +66,9 @@ def test_summary_is_one_row_per_motion(motions: list[Evaluation], summary: pd.Da
             assert row[f"peak_velocity_{j + 1}"] == np.abs(motion.qd[:, j]).max()
             assert row[f"peak_torque_{j + 1}"] == np.abs(motion.tau[:, j]).max()
             assert row[f"peak_power_{j + 1}"] == np.abs(motion.tau[:, j] * motion.qd[:, j]).max()
-        assert row["min_singular_value"] == motion.singular_value.min()
+        usable = motion.time <= (motion.solution.event_time or np.inf)  # as the figure marks it
+        assert row["min_singular_value"] == motion.singular_value[usable].min()
+        assert row["min_spectral_radius"] == motion.spectral_radius[usable].min()
 
 
 def test_printed_values_stand_beside_the_first_optimum_of_their_method(summary: pd.DataFrame) -> None:

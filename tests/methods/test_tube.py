@@ -93,13 +93,14 @@ def test_differences_in_a_tube() -> None:
 
 @pytest.mark.slow
 def test_what_a_tolerance_buys() -> None:
-    asked, options = line(12), ParetoOptions(objectives=("path_tolerance", "kinetic_energy"), steps=2, planner=FEW)
+    few = GlobalOptions(nodes=40, optimised=1, budget=1)
+    asked, options = line(8), ParetoOptions(objectives=("path_tolerance", "kinetic_energy"), steps=2, planner=few)
     motions = [evaluate(asked, one) for one in pareto(asked, options)]
     assert [motion.status for motion in motions] == [Status.SOLVED] * 3
     front = Front(table(motions))
     assert list(front.table["bound"]) == [np.inf, pytest.approx(TOLERANCE / 100), TOLERANCE]
     tolerances, energies = (front.table[name].to_numpy() for name in front.objectives)
-    assert tolerances[0] < 1e-3 * TOLERANCE
+    assert tolerances[0] < 0.5 * tolerances[1]  # on its path at its knots, of which there are few
     assert tolerances[1:] == pytest.approx([TOLERANCE / 100, TOLERANCE], rel=1e-2)
     assert np.all(np.diff(energies) < 0)
     assert draw(front, "a front").axes[0].get_xlabel() == "largest distance from the path [m]"

@@ -12,6 +12,7 @@ from pipeline.config.documents import half_width
 from pipeline.reproduce import drawings as document_figures
 from pipeline.reproduce.verdict import verdict
 from tests.reproduce.printed import FIGURES, TABLES, asked, expected
+from tests.support import ROOT
 
 # --- the rule ---------------------------------------------------------------------------------------------------------
 
@@ -77,6 +78,14 @@ def test_what_differs_says_why_and_what_is_drawn_can_be_drawn() -> None:
     assert {figure.draw for d in asked() for place in d.places for figure in place.figures} == set(
         document_figures.DRAW
     )
+
+
+def test_every_line_of_the_errata_names_its_command() -> None:
+    """That every command is accepted: tests/test_readme.py; what a sample of them shows: test_reproduce.py."""
+    text = (ROOT / "docs" / "errata.md").read_text(encoding="utf-8")
+    lines = [line for line in text.splitlines() if line.startswith("| ") and "what shows it" not in line]
+    assert len(lines) > 25
+    assert [line for line in lines if "`python -m " not in line.split("|")[-2]] == []
 
 
 @pytest.mark.parametrize(

@@ -232,13 +232,13 @@ function makePlane(place, plane, motions, choose) {
   const u = new uPlot(
     {
       width: Math.max(300, place.clientWidth),
-      height: 300,
+      height: 360,
       cursor: { drag: { x: false, y: false }, points: { show: false } },
       legend: { show: false },
       scales: { x: { time: false, range: () => across }, y: { range: () => up } },
       axes: [
         { values, label: plane.x, labelSize: 22, font: "11px system-ui", labelFont: "12px system-ui" },
-        { values, label: plane.y, size: 66, labelSize: 20, font: "11px system-ui", labelFont: "12px system-ui" },
+        { values, label: plane.y, size: 66, labelSize: 20, font: "11px system-ui", labelFont: "11px system-ui" },
       ],
       series: [{}, { paths: () => null, points: { show: false } }],
       hooks: { draw: [(p) => paint(p)] },
@@ -284,8 +284,9 @@ function makePlane(place, plane, motions, choose) {
       if (q.mark) {
         ctx.fillStyle = "#1a202c";
         ctx.font = `${12 * ratio}px system-ui`;
-        ctx.textAlign = "left";
-        ctx.fillText(q.mark, x + 10 * ratio, y - 8 * ratio);
+        const late = x > p.bbox.left + 0.8 * p.bbox.width;
+        ctx.textAlign = late ? "right" : "left";
+        ctx.fillText(q.mark, x + (late ? -10 : 10) * ratio, y - 8 * ratio);
       }
     });
     ctx.restore();

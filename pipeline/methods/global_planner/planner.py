@@ -80,12 +80,14 @@ def by_differences(problem: Problem, options: GlobalOptions, context: Context) -
         return [nothing(problem, Status.NOT_CONVERGED, too_coarse, {})]
     asked, problem = len(problem.times) - 1, replace(problem, times=times)
     grids = refinement(times, coarsest(problem, options.coarse_steps, STEPS if why is None else STEPS_ALONE))
+    context.phase("drawing starts")
     drawn = Starts(problem, grids[0], options, np.random.default_rng(context.seed))
     motions, log = drawn.first, drawn.log
     if not len(motions):
         return [nothing(problem, Status.INFEASIBLE, no_start(problem, log.get("drawn", 0)), log)]
 
     batch = Batch(problem, options) if why is None else None
+    context.phase(f"solving them on {len(grids[0]) - 1} intervals")
     log["solver"] = f"ipopt ({why})" if batch is None else batch.words
     while True:
         starts = _optimise_starts(problem, grids[0], options, motions, batch, context)
@@ -111,6 +113,7 @@ def by_differences(problem: Problem, options: GlobalOptions, context: Context) -
         for start in starts
     ]
     log["barren_starts"] = coarse.barren
+    context.phase("refining and confirming")
     problem, grids, refined = _to_the_end(problem, grids, options, coarse.optima, batch, context)
     log["grids"] = [len(grid) - 1 for grid in grids]
     found = [(fine, members) for fine, members in zip(refined, coarse.members, strict=True) if _good(fine)]

@@ -73,5 +73,5 @@ def _loosen(context: tuple[Problem, GlobalOptions], motion: Array) -> Optimum:
         beyond = np.array(off_path(problem, optimum.q)) / asked
         if not optimum.converged or beyond.max() <= 1:
             break
-        allowed = np.where(beyond > 1, allowed / (beyond * (1 + ROOM)), allowed)
+        allowed = np.where(beyond > 1, allowed / (np.maximum(beyond, 1.0) * (1 + ROOM)), allowed)
     return replace(optimum, solves=solves)
