@@ -193,5 +193,6 @@ def reproduce_in(folder: Path) -> None:
             (documents.read("pontryagin").experiments, ("methods=[pontryagin_as_printed]",)),
         ):
             GlobalHydra.instance().clear()
-            assert reproduce.sweep(list(wanted), folder / "runs", (*words, "parallel.workers=1")) == 0
+            everywhere = ("export.method=none", "parallel.workers=1")
+            assert reproduce.sweep(list(wanted), folder / "runs", (*words, *everywhere)) == 0
     GlobalHydra.instance().clear()
