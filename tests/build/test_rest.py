@@ -12,6 +12,8 @@ from pipeline.build.problem import prepare
 from pipeline.common.errors import ConfigError, RobotError
 from tests.support import ROOT, composed
 
+pytestmark = pytest.mark.slow  # together: each composes and prepares problems in space
+
 ENDS, START = "boundary.rest=[start,end]", "boundary.rest=[start]"
 SPEED = ("timing=constant_speed", "timing.duration=2")
 
