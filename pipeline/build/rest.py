@@ -17,8 +17,7 @@ from pipeline.problem.problem import Boundary, Problem
 from pipeline.robot.limits import STILL
 
 PACE = ("velocity", "acceleration", "jerk", "torque", "power")
-
-
+STUCK = 1e-6  # [rad/s^2] and below: of a motion that does not get away from a singular start; it says nothing
 SHARE = 0.05  # of the motion time, in which the suggested acceleration reaches the motion's largest joint speed
 
 
@@ -102,7 +101,8 @@ def suggested(problem: Problem) -> float:
     torque = np.minimum(problem.bounds.torque, np.where(effort > STILL, effort, np.inf))
     still = np.zeros_like(motion)
     left = np.maximum(torque - np.abs(arm.inverse_dynamics(motion, still, still)), 0.0)
-    least = min(least, float((left / np.abs(arm.mass_matrix(motion)).sum(axis=2)).min())) or 1.0
+    least = min(least, float((left / np.abs(arm.mass_matrix(motion)).sum(axis=2)).min()))
+    least = least if least > STUCK else 1.0
     digit = 10.0 ** np.floor(np.log10(least))
     return float(f"{max(np.floor(least / digit), 1.0) * digit:.1g}")
 
