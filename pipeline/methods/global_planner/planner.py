@@ -15,7 +15,6 @@ from scipy.interpolate import CubicSpline
 
 from pipeline.common.arrays import Array
 from pipeline.config.methods import GlobalOptions
-from pipeline.methods import dynamic_programming
 from pipeline.methods.global_planner.basins import Basins, basins, ceiling
 from pipeline.methods.global_planner.batch import JUMPS, Batch
 from pipeline.methods.global_planner.grids import coarsest, finer, on_knots, refinement
@@ -26,7 +25,7 @@ from pipeline.methods.global_planner.smooth import freer, nothing, rough, smooth
 from pipeline.methods.global_planner.starts import Starts
 from pipeline.methods.global_planner.timed import timed
 from pipeline.methods.global_planner.tube import exactly, loosened
-from pipeline.methods.method import WITH_TIMING, Context, Method
+from pipeline.methods.method import ALONG_LOOPS, WITH_TIMING, Context, Method
 from pipeline.model.kinematics import wrap
 from pipeline.problem.limits import LIMIT_KINDS
 from pipeline.problem.problem import Problem
@@ -131,22 +130,32 @@ def by_differences(problem: Problem, options: GlobalOptions, context: Context) -
     solutions = []
     for rank, (fine, moved) in enumerate(ranked):
         said = _said(problem, asked, options, [fine.q]) if rank == 0 else ""
-        own = {"starts_in_basin": members[id(fine)], "solves": fine.solves}
+        own = {"starts_in_basin": members[id(fine)], **(log if rank == 0 else {})}
+        solution = as_solution(problem, fine, options)
         solutions.append(
-            Solution(
-                "global",
-                Trajectory(problem.times, fine.q),
-                Status.SOLVED,
-                "; ".join(filter(None, (said, moved))),
+            replace(
+                solution,
+                message="; ".join(filter(None, (said, moved))),
                 optimum=rank + 1,
-                tracking_tolerance=TRACKING,
-                limits_kept=LIMIT_KINDS,
-                knots_only=options.refine_to is None,
-                evidence=(words if rank == 0 else "") + fine.evidence,
-                statistics={**(log if rank == 0 else {}), **own},
+                evidence=(words if rank == 0 else "") + solution.evidence,
+                statistics={**own, **solution.statistics},
             )
         )
     return solutions
+
+
+def as_solution(problem: Problem, optimum: Optimum, options: GlobalOptions) -> Solution:
+    """An optimum on the knots of the problem as an answer of the planner."""
+    return Solution(
+        "global",
+        Trajectory(problem.times, optimum.q),
+        Status.SOLVED,
+        tracking_tolerance=TRACKING,
+        limits_kept=LIMIT_KINDS,
+        knots_only=options.refine_to is None,
+        evidence=optimum.evidence,
+        statistics={"solves": optimum.solves},
+    )
 
 
 def finish(
@@ -174,8 +183,9 @@ def refuses(problem: Problem, options: GlobalOptions) -> str | None:
         return why
     if "dynamic_programming" not in options.generators:
         return None
-    why, words = dynamic_programming.dynamic_programming.why_not(rough(problem)), ", ".join(options.generators)
-    return why and f"method.global.starts = {words}: {why}; starts = roadmap serves every problem"
+    why, words = ALONG_LOOPS.why_not(rough(problem)), ", ".join(options.generators)
+    said = f"method.global.starts = {words}: dynamic_programming: {why}; starts = roadmap serves every problem"
+    return why and said
 
 
 global_planner = Method("global", "Planner's optimum", "#2F855A", GlobalOptions, WITH_TIMING, solve, refuses)
