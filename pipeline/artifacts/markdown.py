@@ -12,6 +12,7 @@ from pipeline.artifacts.report import Report
 from pipeline.common.markdown import markdown_table
 from pipeline.config.documents import Printed
 from pipeline.evaluation.evaluation import Evaluation
+from pipeline.model.obstacles import Own
 from pipeline.problem.integrals import INTEGRALS
 
 UNITS = {
@@ -31,6 +32,8 @@ UNITS = {
     "singular_time": "s",
     "min_clearance": "m",
     "min_clearance_between": "m",
+    "min_self_clearance": "m",
+    "min_self_clearance_time": "s",
     "peak_reaction_force": "N",
     "peak_reaction_torque": "N m",
     "max_base_turn": "rad",
@@ -65,6 +68,7 @@ def markdown(report: Report, table: pd.DataFrame, published: Printed) -> str:
     for e in motions.evaluations:
         lines.append("; ".join(filter(None, [f"- **{e.label}**: {e.message or e.status.value}", e.solution.evidence])))
     lines += [f"- robot file: {note}" for note in arm.notes]
+    lines += own_notes(motions.problem.own)
     lines += [f"- path: {note}" for note in reference.notes]
     for result in report.results:
         if section := result.section():
@@ -79,6 +83,16 @@ def markdown(report: Report, table: pd.DataFrame, published: Printed) -> str:
         "",
     ]
     return "\n".join(lines)
+
+
+def own_notes(own: Own | None) -> list[str]:
+    """What is not known of the arm and itself."""
+    if own is None:
+        return ["- not checked: self-collision (collision.self=true or false checks it, where the arm has shapes)"]
+    if own.unknown:
+        return [f"- not checked: self-collision ({own.unknown})"]
+    named = ", ".join(" - ".join(pair) for pair in own.always)
+    return [f"- not checked: {named}, which touch wherever the arm is"] if named else []
 
 
 def _by_quantity(evaluations: Sequence[Evaluation], table: pd.DataFrame, units: Mapping[str, str]) -> list[list[str]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pipeline.build import base
 from pipeline.build.checks import check_problem, require_reach
+from pipeline.build.collision import make_own
 from pipeline.build.goal import make_limits, make_objective, make_obstacles
 from pipeline.build.path import make_knots, make_reference, make_task
 from pipeline.build.rest import check_rest
@@ -36,6 +37,7 @@ def prepare(config: RunConfig) -> Problem:
         limits=make_limits(config.limits, arm),
         boundary=Boundary(config.boundary.kind),
         obstacles=make_obstacles(config.obstacles, arm),
+        own=make_own(config.collision, arm),
         rest=(found or "start" in config.boundary.rest, found or "end" in config.boundary.rest),
         zero_acceleration=config.boundary.zero_acceleration,
         free_law=free_law,

@@ -60,7 +60,7 @@ def solve(problem: Problem, options: DynamicProgrammingOptions, context: Context
             tracking_tolerance=TRACKING,
             knots_only=True,
             grid="method.dynamic_programming.intervals",
-            limits_kept=("position", "velocity", "clearance"),
+            limits_kept=("position", "velocity", "clearance", "self_clearance"),
             statistics={"cost": float(costs[index]), **(log if rank == 0 else {})},
         )
         for rank, index in enumerate(kept)

@@ -9,7 +9,17 @@ import numpy as np
 from pipeline.common.arrays import Array
 from pipeline.model.arm import Arm
 
-LIMIT_KINDS = ("position", "velocity", "acceleration", "jerk", "torque", "power", "clearance", "attitude")
+LIMIT_KINDS = (
+    "position",
+    "velocity",
+    "acceleration",
+    "jerk",
+    "torque",
+    "power",
+    "clearance",
+    "self_clearance",
+    "attitude",
+)
 FREE = np.array(np.inf)
 
 

@@ -156,6 +156,7 @@ class _Predictor:
             objective=self.objective,
             limits=None,
             obstacles=None,
+            own=None,
             times=times,
         )
         result = solve_window(window, times, np.vstack([q, guess]), self.options.tolerance)

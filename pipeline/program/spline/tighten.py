@@ -117,9 +117,10 @@ def _stricter(problem: Problem, curve: Curve, tightened: Tightened, gain: float)
             own[:-1] = np.minimum(own[:-1], getattr(tightened, kind)[:-1] / (1 + inner))
             own[1:] = np.minimum(own[1:], getattr(tightened, kind)[1:] / (1 + inner))
     lacking = 0.0
-    if problem.obstacles is not None:
-        clear = Clearance(problem.task.arm, problem.obstacles).smallest(curve(sampled(curve.times)))
-        lacking = max(0.0, problem.obstacles.margin - float(clear.min()))
+    if problem.keeps_clear:
+        clearance = Clearance(problem.task.arm, problem.obstacles, problem.own)
+        closest = [close for one in curve(sampled(curve.times)) for close in clearance.closest(one)]
+        lacking = max(0.0, *(close.margin - close.distance for close in closest))
     exceeded = any(float(found[kind].max()) > KEPT for kind in ("torque", "power") if kind in found)
     if not exceeded and not lacking:
         return None
