@@ -92,7 +92,10 @@ def own_notes(own: Own | None) -> list[str]:
     if own.unknown:
         return [f"- not checked: self-collision ({own.unknown})"]
     named = ", ".join(" - ".join(pair) for pair in own.always)
-    return [f"- not checked: {named}, which touch wherever the arm is"] if named else []
+    lines = [f"- not checked: {named}, which touch wherever the arm is"] if named else []
+    if own.allowed:
+        lines.append(f"- not checked: {own.allowed} pairs of links that the SRDF or collision.allow let touch")
+    return lines
 
 
 def _by_quantity(evaluations: Sequence[Evaluation], table: pd.DataFrame, units: Mapping[str, str]) -> list[list[str]]:

@@ -19,11 +19,11 @@ from pipeline.robot.touching import Pair, apart, disabled
 SAMPLES = 300  # configurations in each of which a pair touches that counts as one that always does
 
 
-def make_own(collision: CollisionConfig, arm: Arm) -> Own | None:
+def make_own(collision: CollisionConfig, arm: Arm, srdf: str | None = None) -> Own | None:
     """The pairs of links that may not touch; None if nothing is to be known of them.
 
     By default they are kept apart where the arm moves in space. Meshes that are missing leave them unknown, unless
-    collision.self asks for them: then RobotError names the link and the file.
+    collision.self asks for them: then RobotError names the link and the file. srdf: the file that comes with the arm.
     """
     kept = in_space(arm) if collision.own is None else collision.own
     if collision.own is None and not kept:
@@ -34,8 +34,8 @@ def make_own(collision: CollisionConfig, arm: Arm) -> Own | None:
                 f"collision.self = true: {arm.description.name} has no collision shapes; give them in robot.collision"
             )
         return None
-    may = _allowed(collision, arm)
-    pairs = tuple(pair for pair in apart(arm.description) if frozenset(pair) not in may)
+    may, every = _allowed(collision, arm, srdf), apart(arm.description)
+    pairs = tuple(pair for pair in every if frozenset(pair) not in may)
     own = Own(pairs, collision.margin, collision.influence, kept)
     try:
         always = _always(arm, own)
@@ -44,7 +44,7 @@ def make_own(collision: CollisionConfig, arm: Arm) -> Own | None:
             raise
         return Own((), collision.margin, kept=False, unknown=str(error))
     left = tuple(pair for pair in pairs if pair not in always)
-    return Own(left, collision.margin, collision.influence, kept and bool(left), always=tuple(sorted(always)))
+    return Own(left, collision.margin, collision.influence, kept and bool(left), tuple(sorted(always)), len(every) - len(pairs))
 
 
 def in_space(arm: Arm) -> bool:
@@ -53,14 +53,15 @@ def in_space(arm: Arm) -> bool:
     return bool(chain.slides.any() or (np.abs(chain.turn[1:, 2, 2]) < 1 - 1e-9).any())
 
 
-def _allowed(collision: CollisionConfig, arm: Arm) -> set[frozenset[str]]:
+def _allowed(collision: CollisionConfig, arm: Arm, srdf: str | None) -> set[frozenset[str]]:
     links = arm.description.links
     for link in (link for pair in collision.allow for link in pair):
         if link not in links:
             close = difflib.get_close_matches(link, links, n=3, cutoff=0.4) or list(links)[:12]
             raise ConfigError(f"collision.allow: no link is called {link}; did you mean {', '.join(close)}?")
     given = {frozenset(pair) for pair in collision.allow}
-    return given if collision.srdf is None else given | disabled(find(collision.srdf, "collision.srdf"))
+    key, file = ("robot.srdf", srdf) if collision.srdf is None else ("collision.srdf", collision.srdf)
+    return given if file in (None, "none") else given | disabled(find(str(file), key), key)
 
 
 def _always(arm: Arm, own: Own) -> set[Pair]:

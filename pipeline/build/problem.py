@@ -37,7 +37,7 @@ def prepare(config: RunConfig) -> Problem:
         limits=make_limits(config.limits, arm),
         boundary=Boundary(config.boundary.kind),
         obstacles=make_obstacles(config.obstacles, arm),
-        own=make_own(config.collision, arm),
+        own=make_own(config.collision, arm, robot.srdf),
         rest=(found or "start" in config.boundary.rest, found or "end" in config.boundary.rest),
         zero_acceleration=config.boundary.zero_acceleration,
         free_law=free_law,

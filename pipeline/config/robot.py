@@ -106,6 +106,9 @@ class RobotConfig:
             "{link: [{kind: sphere, box, capsule, cylinder or mesh, ...}, ...]}"
         ),
     ] = "file"
+    srdf: Annotated[
+        Text | None, Field(description="SRDF that comes with the file: which links may touch; null: none")
+    ] = None
     q_init: Annotated[Positions | None, Field(description="[rad] initial configuration, base to tip")] = (
         0.0,
         0.327,
@@ -184,7 +187,8 @@ class CollisionConfig:
         Positive, Field(description="[m] beyond the margin, from where on the solver feels another link")
     ] = 0.05
     srdf: Annotated[
-        Text | None, Field(description="file whose disable_collisions say which links may touch; null: none")
+        Text | None,
+        Field(description="SRDF whose disable_collisions say which links may touch; null: robot.srdf; none: of no file"),
     ] = None
     allow: Annotated[
         tuple[Pair, ...], Field(description="[[link, link], ...] that may touch, besides those of the SRDF")

@@ -39,12 +39,12 @@ def apart(description: Description) -> list[Pair]:
     return [(first, second) for first, second in combinations(links, 2) if own[second] - own[first] > 1]
 
 
-def disabled(file: Path) -> set[frozenset[str]]:
-    """The pairs whose collisions an SRDF disables; raises RobotError, one line."""
+def disabled(file: Path, key: str = "collision.srdf") -> set[frozenset[str]]:
+    """The pairs whose collisions an SRDF disables; raises RobotError, one line, which names `key`."""
     if not file.is_file():
-        raise RobotError(f"collision.srdf = {file}: no such file")
-    root = parse(file.read_bytes(), file, "collision.srdf")
+        raise RobotError(f"{key} = {file}: no such file")
+    root = parse(file.read_bytes(), file, key)
     if root.tag != "robot":
-        raise RobotError(f"collision.srdf = {file}: the root element is <{root.tag}>, expected <robot>")
+        raise RobotError(f"{key} = {file}: the root element is <{root.tag}>, expected <robot>")
     pairs = root.findall("disable_collisions")
     return {frozenset((pair.get("link1", ""), pair.get("link2", ""))) for pair in pairs}

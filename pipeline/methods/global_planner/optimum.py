@@ -227,7 +227,7 @@ def clear_between(
         short = lacking(problem, clearance, Trajectory(times, optimum.q))
         if short <= 0 or not optimum.converged:
             break
-        keep_off += 1.2 * short + FINE
+        keep_off += short + FINE / 5
         optimum = again(optimum.q, keep_off)
         solves += optimum.solves
     return replace(optimum, solves=solves), keep_off
