@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -34,11 +35,22 @@ def terminable() -> Iterator[None]:
 
     def go(_: int, frame: FrameType | None) -> None:
         if _loads(frame):
-            signal.signal(signal.SIGALRM, go)
-            signal.setitimer(signal.ITIMER_REAL, SOON)
-            return
-        raise Terminated
+            again()
+        else:
+            raise Terminated
 
+    def again() -> None:
+        signal.signal(signal.SIGALRM, go)
+        signal.setitimer(signal.ITIMER_REAL, SOON)
+
+    def unraisable(lost: sys.UnraisableHookArgs) -> None:
+        """The interpreter drops what is raised in a finaliser or in a weak reference's callback."""
+        if issubclass(lost.exc_type, Terminated):
+            again()
+        else:
+            drop(lost)
+
+    drop, sys.unraisablehook = sys.unraisablehook, unraisable
     before = signal.signal(signal.SIGTERM, leave)
     try:
         yield
@@ -46,6 +58,7 @@ def terminable() -> Iterator[None]:
         insist()
         raise
     finally:
+        sys.unraisablehook = drop
         if signal.getsignal(signal.SIGTERM) is leave:
             signal.signal(signal.SIGTERM, before)
         signal.setitimer(signal.ITIMER_REAL, 0.0)

@@ -13,7 +13,7 @@ from pipeline.build.problem import prepare
 from pipeline.common.arrays import Array
 from pipeline.evaluation.evaluation import evaluate
 from pipeline.model.kinematics import project
-from pipeline.problem.curve import curve, turns_of_cycle
+from pipeline.problem.curve import curve, end_speeds, turns_of_cycle
 from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Solution, Status, Trajectory
 from tests.support import composed
@@ -89,3 +89,17 @@ def test_a_cycle_closes_up_to_full_turns_of_joints_without_limits() -> None:
         np.testing.assert_allclose(smooth(problem.times[0], order), smooth(problem.times[-1], order), atol=1e-9)
     limited = prepare(composed("path=circle", "boundary=cyclic", "limits.upper=9", "limits.lower=-9"))
     assert turns_of_cycle(limited, q) is None
+
+
+def test_only_a_motion_that_ends_is_asked_to_rest() -> None:
+    """Knots along a cubic: its own speeds at its ends; none where the same knots are a cycle, which is repeated."""
+    problem = prepare(composed("path=circle", "timing.steps=12"))
+    t = problem.times
+    q = np.column_stack([t, 1 - t**2, 0.1 * t**3])
+    trajectory = Trajectory(t, q)
+    np.testing.assert_allclose(
+        end_speeds(problem, trajectory), [[1.0, 0.0, 0.0], [1.0, -2 * t[-1], 0.3 * t[-1] ** 2]], atol=1e-9
+    )
+    again = prepare(composed("path=circle", "timing.steps=12", "boundary=cyclic"))
+    assert again.reference.timing.at_rest
+    np.testing.assert_array_equal(end_speeds(again, trajectory), np.zeros((2, 3)))

@@ -7,13 +7,14 @@ from functools import cache
 
 import numpy as np
 import pytest
+from pydrake.math import RollPitchYaw, RotationMatrix
 from scipy.spatial.transform import Rotation
 
 from pipeline.build.problem import prepare
 from pipeline.common.arrays import Array
 from pipeline.config.methods import LsvOptions
 from pipeline.evaluation.evaluation import Evaluation, evaluate
-from pipeline.evaluation.free_body import BasePlant, FreeMotion, integrate
+from pipeline.evaluation.free_body import BasePlant, FreeMotion, integrate, reactions
 from pipeline.methods.global_planner.planner import global_planner
 from pipeline.methods.lsv import inertia_weighted, lsv
 from pipeline.methods.method import Context
@@ -23,7 +24,7 @@ from pipeline.problem.costs import integrals
 from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Solution, Status, Trajectory
 from pipeline.program.feasibility import least_violation, violations
-from tests.support import composed
+from tests.support import composed, robot, within_limits
 
 SIZES = ("starts=population", "configurations=8", "candidates=100", "optimised=2", "refine_to=null")
 FEW = tuple(f"method.global.{key}" for key in SIZES)
@@ -269,6 +270,23 @@ def test_reactions_are_the_rate_of_momentum(rng: np.random.Generator) -> None:
             plant.at(position, rotation, q, np.concatenate([np.zeros(6), qd]))
             sides.append(plant.momentum())
         np.testing.assert_allclose(e.base.reaction[i], (sides[0] - sides[1]) / (2 * h), atol=1e-7)
+
+
+def test_an_arm_at_rest_pulls_at_its_base_by_its_weight(rng: np.random.Generator) -> None:
+    """Placed and turned: the weight of all its bodies, and its moment about the root link."""
+    where, gravity = (0.3, -0.2, 0.5), np.array([0.5, -1.0, -9.5])
+    arm = robot("panda", base_position=where, base_rpy=(0.3, -0.4, 0.5), gravity=tuple(gravity))
+    q, plant = within_limits(arm, 2, rng), BasePlant(arm)
+    np.testing.assert_allclose(
+        Rotation.from_quat(plant.start[0]).as_matrix(),
+        RotationMatrix(RollPitchYaw(0.3, -0.4, 0.5)).matrix(),
+        atol=1e-15,
+    )
+    for row, found in zip(q, reactions(arm, q, 0 * q, 0 * q), strict=True):
+        plant.at(np.array(where), plant.start[0], row, np.zeros(6 + arm.n))
+        weight = plant.plant.CalcTotalMass(plant.context) * gravity
+        lever = plant.plant.CalcCenterOfMassPositionInWorld(plant.context) - where
+        np.testing.assert_allclose(found, -np.concatenate([weight, np.cross(lever, weight)]), atol=1e-10)
 
 
 @pytest.mark.slow

@@ -88,6 +88,13 @@ def test_bad_input_is_one_line_and_leaves_nothing(name: str, run: Run, tmp_path:
     assert list(tmp_path.iterdir()) == []
 
 
+def test_entries_of_a_table_are_deleted(run: Run) -> None:
+    """Of two obstacles that cannot be one stays, and that one is named."""
+    added = [f"+obstacles.shapes.{name}={{kind: ball, size: [{size}]}}" for name, size in (("near", -1), ("far", -2))]
+    assert_refused(run(*added, "~obstacles.shapes.near"), "obstacles.shapes.far", "kind", "ball")
+    assert_refused(run(*added, "~obstacles.shapes.far"), "obstacles.shapes.near", "kind", "ball")
+
+
 TABLES = {
     "a value that is not a number": ("x,y\n0.4,0.0\nnan,0.1\n", ["row 2", "finite"]),
     "a word": ("x,y\n0.4,0.0\n0.3,here\n", ["row 2", "finite"]),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import fcntl
 import json
 import os
+import shlex
 import signal
 import socket
 import subprocess
@@ -134,6 +135,14 @@ def test_how_to_write_what_hydra_reads_in_quotes_only(run: Run, tmp_path: Path) 
     (tmp_path / "arm ö.urdf").write_bytes((ROOT / "robots" / "planar3r.urdf").read_bytes())
     assert_refused(run(*LSV, "robot.urdf=arm ö.urdf"), "'robot.urdf=\"arm ö.urdf\"'")
     assert run(*LSV, 'robot.urdf="arm ö.urdf"').code == 0
+
+
+def test_what_is_told_to_be_written_is_what_a_shell_passes_on(run: Run) -> None:
+    """A value with both kinds of quotes, ended within the outer ones by the shell's own rules."""
+    answer = run(*LSV, 'robot.urdf=it\'s "ö".urdf')
+    told = answer.error.partition("in quotes: ")[2].strip()
+    assert shlex.split(told) == ['robot.urdf="it\'s \\"ö\\".urdf"']
+    assert_refused(run(*LSV, *shlex.split(told)), 'it\'s "ö".urdf', "no such file")
 
 
 @pytest.mark.parametrize("replaced", [False, True])

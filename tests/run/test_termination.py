@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -50,6 +51,26 @@ def test_a_thread_beside_the_main_one_is_left_alone() -> None:
 
     with ThreadPoolExecutor(1) as pool:
         assert pool.submit(within).result() is signal.getsignal(signal.SIGTERM)
+
+
+class Finalised:
+    def __del__(self) -> None:
+        signal.raise_signal(signal.SIGTERM)
+
+
+def test_what_a_finaliser_swallows_is_raised_again(staying: None, capsys: pytest.CaptureFixture[str]) -> None:
+    before, reached = sys.unraisablehook, []
+
+    def finalise() -> None:
+        Finalised()
+        time.sleep(10.0)  # where it arrives at the latest
+        reached.append("never")
+
+    with pytest.raises(Terminated), terminable():
+        finalise()
+    assert not reached
+    assert capsys.readouterr() == ("", "")
+    assert sys.unraisablehook is before
 
 
 LOADER = """
