@@ -164,7 +164,7 @@ def test_the_panda_on_a_line() -> None:
     assert best.objective < weighted.objective < plain.objective
     assert best.objective < 0.8 * plain.objective
     assert max(best.limit_excess.values()) <= 1e-6
-    assert set(best.limit_excess) == {"position", "velocity", "torque"}
+    assert set(best.limit_excess) == {"position", "velocity", "torque", "self_clearance"}
 
 
 @pytest.mark.slow

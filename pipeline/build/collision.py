@@ -44,7 +44,9 @@ def make_own(collision: CollisionConfig, arm: Arm, srdf: str | None = None) -> O
             raise
         return Own((), collision.margin, kept=False, unknown=str(error))
     left = tuple(pair for pair in pairs if pair not in always)
-    return Own(left, collision.margin, collision.influence, kept and bool(left), tuple(sorted(always)), len(every) - len(pairs))
+    return Own(
+        left, collision.margin, collision.influence, kept and bool(left), tuple(sorted(always)), len(every) - len(pairs)
+    )
 
 
 def in_space(arm: Arm) -> bool:

@@ -188,7 +188,9 @@ class CollisionConfig:
     ] = 0.05
     srdf: Annotated[
         Text | None,
-        Field(description="SRDF whose disable_collisions say which links may touch; null: robot.srdf; none: of no file"),
+        Field(
+            description="SRDF whose disable_collisions say which links may touch; null: robot.srdf; none: of no file"
+        ),
     ] = None
     allow: Annotated[
         tuple[Pair, ...], Field(description="[[link, link], ...] that may touch, besides those of the SRDF")

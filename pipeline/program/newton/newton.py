@@ -38,7 +38,7 @@ ON_PATH = 1e-5  # [m, rad] from where the last step is taken
 NEARLY, NEARLY_ON_PATH = 0.3, 1e-3  # of the cost, [m, rad]: so near an optimum, what it will cost is clear
 BARRIER_END = 1e-10
 COMPLEMENTARITY = 10.0  # times BARRIER_END: how far products of slack and multiplier may be from it
-ROUGHLY = 1e-3  # of the decrement and of rows that are missed: near enough for IPOPT to end it
+ROUGHLY, ALMOST = 1e-3, 1e-4  # of the decrement, of rows that are missed: near enough for IPOPT to end it
 FEASIBLE = 1e-9
 
 BEYOND = 1e-6  # [rad] of excess that remains: infeasible
@@ -230,7 +230,7 @@ class Newton:
         near = (step.decrement < ROUGHLY) & (self._missed(state.point.error, state.point.tie) < ON_PATH)
         if self.limits:
             lack = np.maximum(np.abs(self._lack(state)), state.excess).max(axis=1)
-            near &= (state.mu <= 2 * BARRIER_END) & (lack < ROUGHLY)
+            near &= (state.mu <= 2 * BARRIER_END) & (lack < ALMOST)
         return near
 
     def _will_cost(self, state: State, step: Step) -> Array:
