@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 import difflib
+from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.common.errors import ConfigError, RobotError
+from pipeline.common.arrays import Array
+from pipeline.common.errors import ConfigError, PathError, RobotError
 from pipeline.config.robot import CollisionConfig
 from pipeline.model.arm import Arm
 from pipeline.model.clearance import Clearance
 from pipeline.model.kernel.chain import Chain
 from pipeline.model.obstacles import Own
+from pipeline.problem.problem import Problem
 from pipeline.robot.packages import find
-from pipeline.robot.separation import Solid, distance, solids_of
-from pipeline.robot.touching import Pair, apart, disabled
+from pipeline.robot.separation import Solid, depth, distance, solids_of
+from pipeline.robot.touching import Pair, apart, disabled, groups
 
+ANGLES = 128  # of the first joint at which a path is compared with what it carries
+POINTS = 101  # of the path
 SAMPLES = 300  # configurations in each of which a pair touches that counts as one that always does
 
 
@@ -47,6 +52,70 @@ def make_own(collision: CollisionConfig, arm: Arm, srdf: str | None = None) -> O
     return Own(
         left, collision.margin, collision.influence, kept and bool(left), tuple(sorted(always)), len(every) - len(pairs)
     )
+
+
+def require_free_path(problem: Problem) -> None:
+    """Refuse a path inside an obstacle, the base, or what the first joint turns wherever that stands: no motion of the
+    other joints helps. Raises PathError that names the path and the solid.
+
+    The end effector's point need not be on a solid: the path must be deeper inside than the tool's next one is far.
+    """
+    arm, own = problem.task.arm, problem.own
+    pairs = own.pairs if own is not None and own.kept else ()
+    if arm.base.count or len(problem.task.axes) < 3 or not (pairs or problem.obstacles):
+        return
+    carried, solids = groups(arm.description), solids_of(arm.description)
+    clearance = Clearance(arm, problem.obstacles, own)
+    around = Around(arm, clearance, solids)
+    s = np.linspace(0.0, problem.reference.geometry.length, POINTS)
+    path = problem.reference.geometry.sample(s)[0]
+    tools = [link for link in solids if carried[link] == arm.n]
+    for shape in () if problem.obstacles is None else problem.obstacles.shapes:
+        _refuse(f"obstacle {shape.name}", depth(Solid.of(shape), path), s, around.tool(tools))
+    for link in solids:
+        touching = [tool for tool in tools if (link, tool) in pairs]
+        if carried[link] <= 1 and touching:
+            _refuse(f"link {link}", around.inside(link, carried[link], path), s, around.tool(touching))
+
+
+@dataclass(frozen=True)
+class Around:
+    """What a path is compared with: where the tool is from the end effector's point, and how deep it is in links."""
+
+    arm: Arm
+    clearance: Clearance
+    solids: dict[str, list[Solid]]
+
+    def tool(self, links: list[str]) -> float:
+        """How far [m] the end effector's point is from the next solid of these links, which move with it."""
+        q = np.zeros(self.arm.n)
+        point, at = Solid(self.arm.position(q[None])), self.clearance.places(q)
+        apart = (distance(point, solid.moved(*at[link]))[1] for link in links for solid in self.solids[link])
+        return max(0.0, min(apart, default=np.inf))
+
+    def inside(self, link: str, joints: int, path: Array) -> Array:
+        """How deep (K,) [m] points of the path (K, 3) are inside a link, wherever its `joints` (0 or 1) stand."""
+        description, q = self.arm.description, np.zeros((ANGLES if joints else 1, self.arm.n))
+        if joints:
+            if not description.revolute[0]:
+                return np.full(len(path), -np.inf)
+            low, high = max(description.lower[0], -np.pi), min(description.upper[0], np.pi)
+            q[:, 0] = np.linspace(low, high, ANGLES)
+        places = (self.clearance.places(one)[link] for one in q)
+        seen = np.concatenate([(path - position) @ rotation for rotation, position in places])
+        of_each = [depth(solid, seen).reshape(len(q), -1) for solid in self.solids[link]]
+        found, first = np.max(of_each, axis=0).min(axis=0), self.arm.first_joint()
+        step = np.ptp(q[:, 0]) / max(1, len(q) - 1) / 2
+        return np.asarray(found - step * np.linalg.norm(path - first, axis=1))
+
+
+def _refuse(name: str, inside: Array, s: Array, tool: float) -> None:
+    worst = int(np.argmax(inside))
+    if inside[worst] > tool:
+        raise PathError(
+            f"path: it runs {inside[worst]:.3g} m inside {name} (at {s[worst]:.3g} m along it), where the end effector "
+            f"cannot be: its own solids are {tool:.3g} m away"
+        )
 
 
 def in_space(arm: Arm) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pipeline.build import base
 from pipeline.build.checks import check_problem, require_reach
-from pipeline.build.collision import make_own
+from pipeline.build.collision import make_own, require_free_path
 from pipeline.build.goal import make_limits, make_objective, make_obstacles
 from pipeline.build.path import make_knots, make_reference, make_task
 from pipeline.build.rest import check_rest
@@ -46,5 +46,6 @@ def prepare(config: RunConfig) -> Problem:
     check_problem(problem)
     if config.base.kind == "fixed":
         require_reach(problem)
+        require_free_path(problem)
     check_rest(problem)
     return base.place(problem, config)

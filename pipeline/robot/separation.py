@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import nnls
+from scipy.spatial import ConvexHull
 
 from pipeline.common.arrays import Array
 from pipeline.robot.description import Description
@@ -99,6 +100,21 @@ def distance(a: Solid, b: Solid) -> tuple[float, float]:
             break
         n = nearest / high
     return min(low, high) - a.radius - b.radius, high - a.radius - b.radius
+
+
+def depth(solid: Solid, points: Array) -> Array:
+    """How deep (K,) [m] points (K, 3) lie inside a solid; not above 0 outside."""
+    if not (solid.rim or solid.radius):
+        sides = ConvexHull(solid.points).equations
+        return np.asarray(-(points @ sides[:, :3].T + sides[:, 3]).max(axis=1))
+    axis, inner = solid.points[0] - solid.points[-1], points - solid.points.mean(axis=0)
+    length = float(np.linalg.norm(axis))
+    along_it = inner @ axis / max(length, TOUCHES)
+    across = np.linalg.norm(inner - along_it[:, None] * axis / max(length, TOUCHES), axis=1)
+    beyond = np.abs(along_it) - length / 2
+    if solid.rim:
+        return np.asarray(np.minimum(solid.rim - across, -beyond))
+    return np.asarray(solid.radius - np.hypot(across, np.maximum(beyond, 0.0)))
 
 
 def solids_of(description: Description) -> dict[str, list[Solid]]:

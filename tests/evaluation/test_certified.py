@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -73,22 +74,10 @@ def test_where_drake_says_too_much_the_bound_does_not(monkeypatch: pytest.Monkey
     clearance.at(np.array(composed("robot=panda").robot.q_init))
     true = clearance.apart(pair)[0]
 
-    class Wrong:
-        distance, nhat_BA_W = true + 0.01, np.array([0.0, 0.0, 1.0])
-
-    class Query:
-        def ComputeSignedDistancePairClosestPoints(self, *_: object) -> Wrong:  # noqa: N802
-            return Wrong()
-
-    class Port:
-        def Eval(self, _: object) -> Query:  # noqa: N802
-            return Query()
-
-    class Scene:
-        def get_query_output_port(self) -> Port:
-            return Port()
-
-    monkeypatch.setattr(clearance, "_scene", Scene())
+    wrong = SimpleNamespace(distance=true + 0.01, nhat_BA_W=np.array([0.0, 0.0, 1.0]))
+    query = SimpleNamespace(ComputeSignedDistancePairClosestPoints=lambda *_: wrong)
+    port = SimpleNamespace(Eval=lambda _: query)
+    monkeypatch.setattr(clearance, "_scene", SimpleNamespace(get_query_output_port=lambda: port))
     assert clearance.apart(pair) == pytest.approx((true, true), abs=1e-6)
 
 
