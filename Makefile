@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 export OMP_NUM_THREADS := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help run reproduce test fast lint format cover bench package docs pictures clean schema
+.PHONY: help run reproduce audit readings test fast lint format cover bench package docs pictures clean schema
 
 help: ## this list
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
@@ -16,6 +16,12 @@ run: $(VENV)/.installed ## set up, then run the third trajectory of the PMKE pap
 
 reproduce: $(VENV)/.installed ## every printed number and figure of the documents, side by side (outputs/reproduction/)
 	$(BIN)/python -m pipeline.reproduce
+
+audit: $(VENV)/.installed-dev ## recompute the shipped experiments' tables by pinocchio and coal (docs/audit.md)
+	$(BIN)/python -m tests.audit
+
+readings: $(VENV)/.installed-dev ## what the documents' open steps can be read as, and what each reading gives (docs/readings.md)
+	$(BIN)/python -m tests.readings
 
 test: $(VENV)/.installed-dev ## set up, then run the whole test suite
 	$(BIN)/python -m pytest --numprocesses 2 --dist worksteal

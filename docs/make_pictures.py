@@ -82,6 +82,11 @@ def main() -> None:
     run = [sys.executable, "-m", "pipeline", "+experiment=floating3r", f"hydra.run.dir={floating}"]
     subprocess.run(run, check=True)
     small(Image.open(floating / "figures" / "stroboscopic.png"), DOCS / "floating.png")
+    tube = FOLDER.parent / "traj3_tube"
+    words = ["path.exact=false", "path.tolerance=1e-2", "methods=[pareto]", "method.pareto.steps=5"]
+    words += ["method.pareto.objectives=[path_tolerance,kinetic_energy]", "name=traj3_tube", f"hydra.run.dir={tube}"]
+    subprocess.run([sys.executable, "-m", "pipeline", "+experiment=traj3_sendable", *words], check=True)
+    small(Image.open(tube / "figures" / "front.png"), DOCS / "tube.png")
     small(screenshot(runs / "traj3" / "recording.rrd", 4.0), DOCS / "recording.png")
 
 

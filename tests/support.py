@@ -26,7 +26,16 @@ ROOT = Path(__file__).resolve().parents[1]
 
 
 RUN_FILES = {  # what every run leaves that has a confirmed motion
-    *("summary.csv", "summary.md", "trajectories.parquet", "recording.rrd", "run.json", "figures", ".hydra"),
+    *(
+        "summary.csv",
+        "summary.md",
+        "trajectories.parquet",
+        "report.html",
+        "recording.rrd",
+        "run.json",
+        "figures",
+        ".hydra",
+    ),
     *("motion.csv", "motion.json", "motion.yaml"),
 }
 

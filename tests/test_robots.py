@@ -203,6 +203,7 @@ def test_pmke_and_pointing() -> None:
             "path.length=0.2",
             "timing.duration=4",
             "timing.steps=20",
+            "boundary.rest=[]",
         )
     )
     for solution in (

@@ -8,7 +8,7 @@ from pathlib import Path
 from pipeline.artifacts.report import Report
 
 # Modules of this package. The recording opens with a figure, and run.json comes last: it says that a run is finished.
-ARTIFACTS = ("summary", "figures.figures", "motion_files", "recording.recording", "record")
+ARTIFACTS = ("summary", "motion_files", "page.page", "figures.figures", "recording.recording", "animation", "record")
 
 
 def name(artifact: str) -> str:

@@ -1,4 +1,6 @@
-"""A floating base in pictures: the box of even density that has the spacecraft's mass and inertia."""
+"""What pictures of every kind show besides the arm: its path, and the box of even density that has the mass and inertia
+of a floating base.
+"""
 
 from __future__ import annotations
 
@@ -10,9 +12,18 @@ from scipy.spatial.transform import Rotation
 from pipeline.common.arrays import Array
 from pipeline.evaluation.base import BaseMotion
 from pipeline.model.arm import Arm
+from pipeline.problem.problem import Problem
 from pipeline.robot.shapes import Shape
 
+POINTS = 201  # of the path
 SMALLEST, THIN = 0.04, 0.1  # [m] of an edge; of the height of a planar arm's base, relative
+
+
+def path_in_world(problem: Problem) -> Array:
+    """The prescribed path (POINTS, 3) [m] in the world; what is not prescribed stays as at `q_init`."""
+    geometry = problem.reference.geometry
+    path = geometry.sample(np.linspace(0.0, geometry.length, POINTS))[0]
+    return problem.task.in_world(path, problem.task.arm.position(problem.q_init[None])[0])
 
 
 def box(arm: Arm) -> Shape:

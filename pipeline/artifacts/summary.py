@@ -137,7 +137,8 @@ def _base(problem: Problem, e: Evaluation) -> dict[str, Any]:
 
 
 def _row(problem: Problem, e: Evaluation) -> dict[str, Any]:
-    radius = int(np.argmin(e.spectral_radius))
+    usable = _usable(e)
+    radius = int(np.argmin(e.spectral_radius[:usable]))
     row: dict[str, Any] = {
         "method": e.method,
         "optimum": e.solution.optimum,
@@ -168,7 +169,7 @@ def _row(problem: Problem, e: Evaluation) -> dict[str, Any]:
     for suffix, excess in (("", e.limit_excess), ("_between", e.limit_excess_between)):
         row |= {f"{kind}_limit_excess{suffix}": value for kind, value in excess.items()}
     row |= {
-        "min_singular_value": e.singular_value.min(),
+        "min_singular_value": e.singular_value[:usable].min(),
         "min_spectral_radius": e.spectral_radius[radius],
         "min_spectral_radius_time": e.time[radius],
         **_updates(e),
@@ -178,6 +179,12 @@ def _row(problem: Problem, e: Evaluation) -> dict[str, Any]:
         "singular_time": np.nan if e.solution.event_time is None else e.solution.event_time,
     }
     return row if e.solution.found else _without_numbers(row)
+
+
+def _usable(e: Evaluation) -> int:
+    """How many knots lie before the singularity that a motion met, if it met one: behind it its numbers say nothing."""
+    event = e.solution.event_time
+    return len(e.time) if event is None else max(1, int(np.searchsorted(e.time, event, side="right")))
 
 
 def _without_numbers(row: dict[str, Any]) -> dict[str, Any]:

@@ -52,23 +52,38 @@ def write(folder: Path, runs: Sequence[Path] | None = None) -> None:
         runs = [file.parent for file in folder.glob("*/summary.csv")]
     if not runs:
         return
-    runs = sorted(runs, key=lambda run: _natural(run.name))
-    overrides = _swept([_overrides(run) for run in runs])
+    runs = in_order(runs)
+    save(folder, "sweep", f"Sweep {folder.name}", runs, [run.name for run in runs])
+    print(f"sweep table in {folder / 'sweep.md'}")
+
+
+def save(folder: Path, name: str, title: str, runs: Sequence[Path], names: Sequence[str]) -> None:
+    """The table of `runs`, called `names`, as `name`.csv and `name`.md."""
+    overrides = swept_by(runs)
     parts = []
-    for run, own in zip(runs, overrides, strict=True):
+    for run, called, own in zip(runs, names, overrides, strict=True):
         part = _summary(run)
         taken = set(part.columns)
         words = {key if key not in taken else f"override {key}": value for key, value in own.items()}
-        parts.append(pd.concat([pd.DataFrame({"run": run.name, **words}, index=part.index), part], axis=1))
+        parts.append(pd.concat([pd.DataFrame({"run": called, **words}, index=part.index), part], axis=1))
     table = pd.concat(parts, ignore_index=True)
-    write_beside(folder / "sweep.csv", lambda file: table.to_csv(file, index=False))
+    write_beside(folder / f"{name}.csv", lambda file: table.to_csv(file, index=False))
     swept = list(table.columns[1 : 1 + len(overrides[0])])
     notes = table["published_note"].dropna().unique().tolist() if "published_note" in table else []
     rows = [["run", *swept, "method", "status", *(title for title, *_ in NUMBERS), "message"]]
     rows += [_cells(row, swept) for row in table.to_dict("records")]
-    text = "\n".join([f"# Sweep {folder.name}", "", *markdown_table(rows), "", *(f"- {note}" for note in notes), ""])
-    write_beside(folder / "sweep.md", lambda file: file.write_text(text, encoding="utf-8"))
-    print(f"sweep table in {folder / 'sweep.md'}")
+    text = "\n".join([f"# {title}", "", *markdown_table(rows), "", *(f"- {note}" for note in notes), ""])
+    write_beside(folder / f"{name}.md", lambda file: file.write_text(text, encoding="utf-8"))
+
+
+def in_order(runs: Sequence[Path]) -> list[Path]:
+    """As they were run: 2 before 10."""
+    return sorted(runs, key=lambda run: _natural(run.name))
+
+
+def swept_by(runs: Sequence[Path]) -> list[dict[str, str]]:
+    """What the command line said for each run that it did not say for all of them."""
+    return _swept([_overrides(run) for run in runs])
 
 
 def _cells(row: Mapping[Any, Any], swept: Sequence[str]) -> list[str]:

@@ -26,7 +26,7 @@ from pipeline.robot.urdf import check_root, root_mass
 def place(problem: Problem, config: RunConfig) -> Problem:
     """The problem on the base that `config` asks for; raises ConfigError if they do not go together."""
     wanted = {key for key, weight in config.objective.weights.items() if weight}
-    wanted |= set(config.method.pareto.objectives) - {"duration"} if "pareto" in config.methods else set()
+    wanted |= INTEGRALS.keys() & set(config.method.pareto.objectives) if "pareto" in config.methods else set()
     bases = {INTEGRALS[name].base for name in wanted}
     free = isinstance(config.base, FreeBaseConfig)
     if "floating" in bases and not free:
@@ -81,6 +81,8 @@ def _moved(problem: Problem, base: Base) -> Problem:
         own.attitude,
         padded(np.broadcast_to(own.acceleration, fixed.n)),
         padded(np.broadcast_to(own.jerk, fixed.n)),
+        own.tool_speed,
+        own.tool_acceleration,
     )
     q_init = np.concatenate([np.zeros(base.count), problem.q_init])
     return replace(problem, task=replace(problem.task, arm=arm), q_init=q_init, limits=limits)

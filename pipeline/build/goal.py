@@ -22,10 +22,15 @@ from pipeline.robot.limits import UNLIMITED
 from pipeline.robot.packages import find
 
 
-def make_limits(limits: LimitsConfig, arm: Arm) -> Limits:
-    """The description's limits as far as `kind` takes them, overridden by the file, and that by the values given."""
-    stated = {} if limits.file is None else read(find(limits.file, "limits.file"), arm.description.joints)
+def make_limits(limits: LimitsConfig, arm: Arm, own: str | None = None) -> Limits:
+    """The description's limits as far as `kind` takes them, overridden by the file, and that by the values given.
+
+    own: robot.limits, the file of the accelerations that hold where nothing else states any; None: none does.
+    """
+    stated = _stated(limits.file, "limits.file", arm)
     description, free = arm.description, np.full(arm.n, np.inf)
+    accelerations = _stated(own, "robot.limits", arm).get("acceleration", free)
+    accelerations = np.where(np.isnan(accelerations), np.inf, accelerations)
     joint, all_of_them = limits.kind != "none", limits.kind == "joint_torque_power"
 
     def bound(key: str, own: Array) -> Array:
@@ -43,10 +48,20 @@ def make_limits(limits: LimitsConfig, arm: Arm) -> Limits:
         velocity=bound("velocity", description.velocity if joint else free),
         torque=bound("torque", description.effort if all_of_them else free),
         power=bound("power", free),
-        acceleration=bound("acceleration", free),
+        acceleration=bound("acceleration", accelerations),
         jerk=bound("jerk", free),
-        attitude=np.inf if limits.attitude is None else limits.attitude,
+        attitude=_one(limits.attitude),
+        tool_speed=_one(limits.tool_speed),
+        tool_acceleration=_one(limits.tool_acceleration),
     )
+
+
+def _one(bound: float | None) -> float:
+    return np.inf if bound is None else bound
+
+
+def _stated(file: str | None, key: str, arm: Arm) -> dict[str, Array]:
+    return {} if file is None else read(find(file, key), arm.description.joints, key)
 
 
 def make_objective(config: RunConfig, arm: Arm) -> Objective:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from pipeline.build.gcode import feeds, is_gcode, moves_of
 from pipeline.common.arrays import Array
 from pipeline.common.errors import ConfigError, PathError, RobotError
 from pipeline.config.messages import shown
@@ -80,7 +81,17 @@ def make_reference(path: Any, timing: TimingConfig, task: Task, q_init: Array) -
         raise ConfigError(
             "path.orientation, path.turn: the task prescribes no orientation; set robot.orientation to full or pointing"
         )
-    if isinstance(path, WaypointsConfig):
+    if isinstance(path, WaypointsConfig) and is_gcode(path):
+        found, moves, said = moves_of(path, task.axes, here[:count])
+        geometry, orientation = found.geometry, None
+        law: Timing
+        if timing.law == "from_file":
+            law = feeds(path, timing, found, moves)
+        else:
+            law = _law(path, timing, found, None)
+            said.append(f"its feeds are not used, since timing.law = {timing.law}")
+        notes = tuple(said)
+    elif isinstance(path, WaypointsConfig):
         rows = _read(path, timing, task)
         given_points = rows.points * UNITS[path.units]
         points = given_points + here[:count] - given_points[0] if path.relative else given_points
@@ -100,7 +111,8 @@ def make_reference(path: Any, timing: TimingConfig, task: Task, q_init: Array) -
     start = np.hstack([one.sample(np.zeros(1))[0] for one in (geometry, orientation) if one is not None])
     if np.abs(task.error(q_init[None], start)).max() > 1e-12:
         q_init = place(task, q_init, start[0])
-    return Reference(geometry, law, orientation, path.tolerance, path.orientation_tolerance, notes), q_init
+    tolerances = path.tolerance, path.orientation_tolerance
+    return Reference(geometry, law, orientation, *tolerances, notes, path.exact), q_init
 
 
 def _curve(path: Any, task: Task, here: Array) -> Geometry:

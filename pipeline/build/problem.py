@@ -7,8 +7,9 @@ from pipeline.build.checks import check_problem, require_reach
 from pipeline.build.collision import make_own, require_free_path
 from pipeline.build.goal import make_limits, make_objective, make_obstacles
 from pipeline.build.path import make_knots, make_reference, make_task
-from pipeline.build.rest import check_rest
+from pipeline.build.rest import check_rest, ends_at_rest
 from pipeline.build.robot import initial, load
+from pipeline.build.tool import check_tool
 from pipeline.config.run import RunConfig
 from pipeline.config.steps import refuse_endless
 from pipeline.problem.problem import Boundary, Problem
@@ -27,18 +28,18 @@ def prepare(config: RunConfig) -> Problem:
     if config.timing.law == "from_file":
         refuse_endless(config, reference.duration, "path.file, which takes ")
     free_law, free_duration = config.timing.law == "optimal", config.timing.duration == "shortest"
-    found = free_law or free_duration  # from rest to rest
+    rest = ends_at_rest(config, reference)
     problem = Problem(
         task,
         reference,
         q_init,
         make_knots(config.timing, reference.duration),
         objective=make_objective(config, arm),
-        limits=make_limits(config.limits, arm),
+        limits=make_limits(config.limits, arm, config.robot.limits if any(rest) else None),
         boundary=Boundary(config.boundary.kind),
         obstacles=make_obstacles(config.obstacles, arm),
         own=make_own(config.collision, arm, robot.srdf),
-        rest=(found or "start" in config.boundary.rest, found or "end" in config.boundary.rest),
+        rest=rest,
         zero_acceleration=config.boundary.zero_acceleration,
         free_law=free_law,
         free_duration=free_duration,
@@ -48,4 +49,5 @@ def prepare(config: RunConfig) -> Problem:
         require_reach(problem)
         require_free_path(problem)
     check_rest(problem)
+    check_tool(problem)
     return base.place(problem, config)

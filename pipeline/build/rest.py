@@ -2,17 +2,40 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 
 from pipeline.common.arrays import Array
 from pipeline.common.errors import ConfigError
+from pipeline.common.files import shipped
+from pipeline.config.run import RunConfig
 from pipeline.model.kinematics import project
+from pipeline.path.reference import Reference
 from pipeline.problem.problem import Boundary, Problem
+from pipeline.robot.limits import STILL
 
 PACE = ("velocity", "acceleration", "jerk", "torque", "power")
 
 
 SHARE = 0.05  # of the motion time, in which the suggested acceleration reaches the motion's largest joint speed
+
+
+def ends_at_rest(config: RunConfig, reference: Reference) -> tuple[bool, bool]:
+    """Whether all joints rest at the start, at the end.
+
+    Where `boundary.rest` says nothing they rest at both, so that the motion can be sent: but for the arms of `robots/`,
+    whose motions are the papers', for a path that is entered at speed, and where no method can be told to rest, since
+    the planner does not run or the base moves or is held.
+    """
+    if config.timing.law == "optimal" or config.timing.duration == "shortest":
+        return True, True
+    if config.boundary.rest is not None:
+        return "start" in config.boundary.rest, "end" in config.boundary.rest
+    papers = shipped(f"robots/{Path(config.robot.urdf).name}").is_file()
+    planned = "global" in config.methods and config.base.kind == "fixed" and config.objective.kind != "reaction"
+    rests = planned and reference.timing.at_rest and not papers
+    return rests, rests
 
 
 def check_rest(problem: Problem) -> None:
@@ -42,7 +65,8 @@ def check_rest(problem: Problem) -> None:
         raise ConfigError(
             "boundary.rest: with a given start and an objective of velocities there is no best motion from rest "
             "unless the accelerations of all joints are limited: it would jump to its speed within one step, however "
-            f"short; set limits.acceleration, such as {suggested(problem):g} rad/s^2"
+            f"short; set limits.acceleration, such as {suggested(problem):g} rad/s^2, or a file of them in limits.file "
+            "or robot.limits; boundary.rest=[] lets it jump"
         )
 
 
@@ -54,7 +78,8 @@ def unlimited_start(problem: Problem) -> bool:
 
 
 def suggested(problem: Problem) -> float:
-    """An acceleration [rad/s^2] that leaves a motion time to speed up, and that the torque limits allow, to one digit.
+    """An acceleration [rad/s^2] that leaves a motion time to speed up, and that the torques of the limits and of the
+    robot's file allow, to one digit.
 
     That of the largest joint speed of the inertia-weighted pseudoinverse motion in a share of the motion time, or in
     two steps of the grid if they are longer: a shorter layer would not be resolved.
@@ -63,8 +88,11 @@ def suggested(problem: Problem) -> float:
     within = max(SHARE * problem.reference.duration, 2 * float(np.diff(times).max()))
     motion = _weighted_motion(problem)
     least = float(np.abs(np.diff(motion, axis=0) / np.diff(times)[:, None]).max()) / within
-    inertia = np.abs(arm.mass_matrix(motion)).sum(axis=2)
-    least = min(least, float((problem.bounds.torque / inertia).min())) or 1.0
+    effort = arm.description.effort
+    torque = np.minimum(problem.bounds.torque, np.where(effort > STILL, effort, np.inf))
+    still = np.zeros_like(motion)
+    left = np.maximum(torque - np.abs(arm.inverse_dynamics(motion, still, still)), 0.0)
+    least = min(least, float((left / np.abs(arm.mass_matrix(motion)).sum(axis=2)).min())) or 1.0
     digit = 10.0 ** np.floor(np.log10(least))
     return float(f"{max(np.floor(least / digit), 1.0) * digit:.1g}")
 

@@ -19,7 +19,7 @@ from pydantic import Field
 from pipeline.common.errors import ConfigError
 from pipeline.common.files import shipped
 from pipeline.config.fields import Number, Text, build, schema
-from pipeline.config.found import Ratio, Simple, Summary
+from pipeline.config.found import Cell, Ratio, Simple, Summary
 
 FOLDER = shipped("conf") / "reproduction"
 
@@ -39,13 +39,10 @@ class Row:
     unit: Annotated[Text, Field(description="of the number")] = ""
     found: Annotated[Simple | Ratio, Field(discriminator="kind")] = Summary()
     reading: Annotated[Text, Field(description="another way to read it, if it is a misprint")] = ""
-    tolerance: Annotated[
-        Annotated[Number, Field(gt=0)] | None, Field(description="in place of the rounding, with its reason in `why`")
-    ] = None
-    why: Annotated[Text, Field(description="the reason of the tolerance")] = ""
     between: Annotated[Pair | None, Field(description="what words mean as numbers")] = None
     better: Annotated[
-        Literal["neither", "lower", "higher"], Field(description="the side on which a value is better")
+        Literal["neither", "lower", "higher"],
+        Field(description="the side on which a value is better, of what the document minimises or maximises"),
     ] = "neither"
     masses: Annotated[
         Literal["no", "fit", "check"],
@@ -116,6 +113,16 @@ class Document:
     def rows(self) -> list[tuple[Place, Row]]:
         return [(place, row) for place in self.places for row in place.rows]
 
+    def derived(self, row: Row) -> bool:
+        """Whether a row is a ratio of two numbers that have rows of their own: it is not counted again."""
+        return bool(row.found.parts) and self._cells.issuperset((p.experiment, p.cell) for p in row.found.parts)
+
+    @cached_property
+    def _cells(self) -> frozenset[tuple[str, Cell | None]]:
+        """What summary.csv holds of the printed numbers, by experiment."""
+        found = (row.found for _, row in self.rows)
+        return frozenset((one.experiments[0], one.cell) for one in found if one.cell)
+
 
 def read(name: str, folder: Path = FOLDER) -> Document:
     """The document `name`; raises ConfigError, one line."""
@@ -141,8 +148,6 @@ def _check(row: Row, where: str) -> None:
             half_width(printed)
         except ValueError as error:
             raise ConfigError(f"{where}: {key}: {error}; words need `between`") from None
-    if row.tolerance is not None and not row.why:
-        raise ConfigError(f"{where}: a tolerance needs its reason, `why`")
 
 
 def half_width(printed: str) -> float:

@@ -43,6 +43,11 @@ class Found:
         """Whether it is a computing time: of this machine, as the printed one is of another."""
         return False
 
+    @property
+    def parts(self) -> tuple[Found, ...]:
+        """The numbers that it is the ratio of, if it is one."""
+        return ()
+
 
 @schema
 class Summary(Found):
@@ -196,6 +201,11 @@ class Ratio:
     kind: Literal["ratio"] = "ratio"
     cell: ClassVar[None] = None
     timing: ClassVar[bool] = False
+
+    @property
+    def parts(self) -> tuple[Found, ...]:
+        """Both numbers."""
+        return self.of, self.to
 
     @property
     def experiments(self) -> tuple[str, ...]:

@@ -122,6 +122,14 @@ class LimitsConfig:
     jerk: Annotated[
         OneOrList[Bound] | None, Field(description="[rad/s^3] largest joint jerk; needs boundary.zero_acceleration")
     ] = None
+    tool_speed: Annotated[
+        Bound | None,
+        Field(description="[m/s] largest linear speed of the end effector; how fast it turns is not limited"),
+    ] = None
+    tool_acceleration: Annotated[
+        Bound | None,
+        Field(description="[m/s^2] largest linear acceleration of the end effector, along its path and across it"),
+    ] = None
     file: Annotated[
         Text | None,
         Field(description="YAML file of ROS 2, joint_limits.yaml: what it states holds, a value given here overrides"),
@@ -141,10 +149,12 @@ class BoundaryConfig:
         Field(description="fixed: starts at robot.q_init; free: anywhere on its manifold; cyclic: ends as it began"),
     ] = "fixed"
     rest: Annotated[
-        tuple[Literal["start", "end"], ...],
-        AfterValidator(once),
-        Field(description="at which ends all joints rest, so that the motion can be sent to a robot"),
-    ] = ()
+        Annotated[tuple[Literal["start", "end"], ...], AfterValidator(once)] | None,
+        Field(
+            description="at which ends all joints rest, so that the motion can be sent to a robot; null: at both, but "
+            "for the arms in robots/, moving bases, paths that are entered at speed, and runs without the method global"
+        ),
+    ] = None
     zero_acceleration: Annotated[
         Switch, Field(description="whether they do not accelerate there either, as limits of jerk need")
     ] = False

@@ -71,9 +71,9 @@ class PmkeOptions:
     update_interval: Annotated[Positive, Field(description="[s] between predictions (I)")] = 0.5
     objective: Prediction = "problem"
     interpolation: Annotated[
-        Literal["quintic", "cubic"],
-        Field(description="through the predicted knots; quintic: as the paper's end conditions need"),
-    ] = "quintic"
+        Literal["quartic", "quintic", "cubic"],
+        Field(description="through the predicted knots; quartic: the paper's, with a knot inside each interval"),
+    ] = "quartic"
     gain: Gain = 0.0
     tolerance: Annotated[Positive, Field(description="of a prediction, relative to its energy")] = 1e-8
     singular_value: Singular = 0.03
@@ -114,7 +114,7 @@ class GlobalOptions:
         Literal["differences", "spline"] | None,
         Field(
             description="differences: backward, as in the papers; spline: a smooth curve that keeps its limits between "
-            "the knots too; null: spline where boundary.rest, limits.acceleration or limits.jerk ask for it"
+            "the knots too; null: spline where boundary.rest, limits of acceleration or jerk, or an obstacle ask for it"
         ),
     ] = None
     nodes: Annotated[Whole, Field(ge=8, le=10_000, description="of the roadmap, in each layer")] = 300
@@ -252,8 +252,11 @@ class ParetoOptions:
         Literal["epsilon_constraint", "weighting"], Field(description="how the points between the extremes are found")
     ] = "epsilon_constraint"
     objectives: Annotated[
-        Words[Literal[Integral, "duration"]],
-        Field(description="the two integrals; duration and one of them: the law is free (timing=optimal)"),
+        Words[Literal[Integral, "duration", "path_tolerance"]],
+        Field(
+            description="the two integrals; duration and one of them: the law is free (timing=optimal); path_tolerance "
+            "and one of them: the path need not be kept exactly (path.exact=false)"
+        ),
     ] = ("kinetic_energy", "torque")
     steps: Annotated[Whole, Field(ge=2, le=10_000, description="of each of the two directions")] = 10
     rounds: Annotated[Whole, Field(ge=0, le=1000, description="of starts from both neighbours, at most")] = 3

@@ -48,6 +48,10 @@ class PathConfig:
         0.0,
         0.0,
     )
+    exact: Annotated[
+        Switch,
+        Field(description="whether every knot is on the path; false: a motion may use all of the tolerances, anywhere"),
+    ] = True
     tolerance: Annotated[Number, Field(gt=0, description="[m] how far from it a motion may be between its knots")] = (
         1e-4
     )
@@ -87,7 +91,11 @@ class WaypointsConfig(PathConfig):
 
     kind: Literal["waypoints"] = "waypoints"
     file: Annotated[
-        Text, Field(description="CSV file with header x,y or x,y,z, in m; orientations and times beside")
+        Text,
+        Field(
+            description="CSV file with header x,y or x,y,z, in m, orientations and times beside; or G-code (.nc, "
+            ".gcode, .tap)"
+        ),
     ] = ""
     relative: Annotated[Switch, Field(description="shift the curve so that it starts at the end effector")] = False
     units: Annotated[Literal["m", "mm"], Field(description="of the points in the file")] = "m"
@@ -99,6 +107,9 @@ class WaypointsConfig(PathConfig):
         ),
     ] = "spline"
     blend: Annotated[Number, Field(gt=0, description="[m] how far corners that blend may be left, at most")] = 0.005
+    rapid: Annotated[
+        Number, Field(gt=0, description="[m/s] of the moves G0 of a file of G-code, with timing.law from_file")
+    ] = 0.1
 
 
 @schema
@@ -109,7 +120,7 @@ class TimingConfig:
         Literal["raised_cosine", "constant_speed", "quintic", "cruise", "optimal", "from_file"],
         Field(
             description="how the path is run through in time; optimal: as costs least, found with the motion; "
-            "from_file: by the column time of path.file"
+            "from_file: by the column time of path.file, or the feeds of G-code"
         ),
     ] = "raised_cosine"
     duration: Annotated[
@@ -117,7 +128,12 @@ class TimingConfig:
         Field(description="[s] motion time, unless it is from_file; shortest: as short as the limits allow"),
     ] = 10.0
     ramp: Annotated[
-        Number, Field(ge=1e-3, le=0.5, description="of law cruise: the share of the motion time for each of its ends")
+        Number,
+        Field(
+            ge=1e-3,
+            le=0.5,
+            description="of law cruise, and of the feeds of G-code: the share of the time for each of its ends",
+        ),
     ] = 0.4
     steps: Annotated[Whole, Field(ge=2, le=100_000, description="intervals of the grid of the planner's optima")] = 100
     dense: Annotated[

@@ -114,6 +114,13 @@ class RobotConfig:
         0.327,
         -0.754,
     )
+    limits: Annotated[
+        Text | None,
+        Field(
+            description="joint_limits.yaml of ROS 2 with its largest accelerations: they hold where the joints rest at "
+            "an end, unless limits.acceleration or limits.file states others"
+        ),
+    ] = None
     locked: Annotated[
         dict[str, Position] | None, Field(description="{joint: position [rad or m], ...} of joints that are held")
     ] = None

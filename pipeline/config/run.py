@@ -50,6 +50,16 @@ class SweepConfig:
 
 
 @schema
+class ArtifactsConfig:
+    """What a run leaves beside what every run leaves."""
+
+    animation: Annotated[
+        Literal["gif", "mp4"] | None,
+        Field(description="a film of the motions for slides; mp4 needs ffmpeg; null: none"),
+    ] = None
+
+
+@schema
 class RunConfig:
     """Everything that one run needs."""
 
@@ -75,6 +85,7 @@ class RunConfig:
     method: MethodConfig = MethodConfig()
     parallel: ParallelConfig = ParallelConfig()
     sweep: SweepConfig = SweepConfig()
+    artifacts: ArtifactsConfig = ArtifactsConfig()
     candidate_study: CandidateStudyConfig = CandidateStudyConfig()
     export: ExportConfig = ExportConfig()
     retiming: RetimingConfig = RetimingConfig()

@@ -13,9 +13,9 @@ from pipeline.common.arrays import Array
 from pipeline.evaluation.base import angle_between
 from pipeline.evaluation.certified import Near, near
 from pipeline.evaluation.clearance import Clearance
-from pipeline.evaluation.limits import excesses, limit_excess
+from pipeline.evaluation.limits import excesses, limit_excess, of_tool
 from pipeline.evaluation.plant import SinglePlant
-from pipeline.evaluation.sums import weighted_sum
+from pipeline.evaluation.sums import differences, weighted_sum
 from pipeline.problem.problem import Boundary, Problem
 from pipeline.problem.solution import Trajectory
 
@@ -58,7 +58,7 @@ def between_knots(
     q, qd, qdd = spline(moments), spline(moments, 1), spline(moments, 2)
     jerk = np.repeat(6 * spline.c[0], BETWEEN + 1, axis=0)  # constant in every interval
     energy, secondary, spinning = np.zeros((3, len(moments)))
-    tau, nb, way = np.zeros_like(q), plant.nb, np.tile(plant.start, (len(moments), 1, 1))
+    tau, pace, nb, way = np.zeros_like(q), np.zeros((len(q), 2)), plant.nb, np.tile(plant.start, (len(moments), 1, 1))
     for i in range(len(moments)):
         plant.at(q[i], qd[i])
         energy[i] = plant.kinetic_energy()
@@ -66,6 +66,8 @@ def between_knots(
             way[i], spinning[i] = plant.base()[1], plant.spin_squared()
         if problem.bounds.any or smooth:
             tau[i] = plant.torque(qdd[i])
+        if problem.bounds.limits_tool:
+            pace[i] = plant.pace(problem.task, qdd[i])
         if problem.objective.secondary:
             secondary[i] = plant.secondary(problem, q[i])
     rates = {"kinetic_energy": energy, "velocity_norm": (qd[:, nb:] ** 2).sum(axis=1), "base_rotation": spinning}
@@ -76,8 +78,29 @@ def between_knots(
     }
     ends_at = {name: float(running[name][-1]) for name in running}
     turn = float(angle_between(plant.start, way).max())
-    excess = limit_excess(problem, q, qd, tau, clear.obstacles.bound, turn, own=clear.own.bound, qdd=qdd, jerk=jerk)
+    excess = limit_excess(
+        problem, q, qd, tau, clear.obstacles.bound, turn, own=clear.own.bound, qdd=qdd, jerk=jerk, pace=pace
+    )
     return Between(weighted_sum(problem, ends_at, ends_at["secondary"]), excess, running)
+
+
+def tool_pace(
+    problem: Problem, plant: SinglePlant, trajectory: Trajectory, position: Array, rates: tuple[Array, Array]
+) -> Array | None:
+    """Speed [m/s] and acceleration [m/s^2] of the tool (N + 1, 2) at the knots, where they are limited; of a motion
+    that is known at its knots alone by backward differences of the tool's own positions (N + 1, 3).
+    """
+    if not problem.bounds.limits_tool:
+        return None
+    if trajectory.ends is None:
+        own = Trajectory(trajectory.time, position[:, problem.task.rows])
+        both = differences(own, problem.boundary, problem.reference.timing.at_rest)
+        return np.column_stack([np.linalg.norm(values, axis=1) for values in both])
+    found = np.empty((len(position), 2))
+    for i, (q, qd, qdd) in enumerate(zip(trajectory.q, *rates, strict=True)):
+        plant.at(q, qd)
+        found[i] = plant.pace(problem.task, qdd)
+    return found
 
 
 @dataclass(frozen=True)
@@ -97,10 +120,12 @@ def audit(problem: Problem, curve: Callable[..., Array], knots: Array, time: Arr
     q, qd, qdd, jerk = (curve(time, order) for order in range(4))
     plant, targets = SinglePlant(problem.task.arm), problem.reference.position(time)
     error, turned, way, tau = np.empty(len(time)), np.empty(len(time)), np.empty((len(time), 3, 3)), np.empty_like(q)
+    pace = np.zeros((len(time), 2))
     for i in range(len(time)):
         plant.at(q[i], qd[i])
         error[i], turned[i] = plant.task_error(problem.task, targets[i])
         tau[i], way[i] = plant.torque(qdd[i]), plant.base()[1]
+        pace[i] = plant.pace(problem.task, qdd[i])
     turn = angle_between(plant.start, way)
     clear = near(problem, Clearance(problem.task.arm, problem.obstacles, problem.own), curve, knots)
     worst = {
@@ -112,7 +137,7 @@ def audit(problem: Problem, curve: Callable[..., Array], knots: Array, time: Arr
             worst[kind] = (int(np.abs(time - found.time).argmin()), 0)
     if np.isfinite(problem.bounds.attitude):
         worst["attitude"] = (int(np.argmax(turn)), 0)
-    excess = limit_excess(
-        problem, q, qd, tau, clear.obstacles.bound, float(turn.max()), own=clear.own.bound, qdd=qdd, jerk=jerk
-    )
+    worst |= {kind: (int(np.argmax(excess)), 0) for kind, excess in of_tool(problem, pace).items()}
+    nearest, most = clear.obstacles.bound, float(turn.max())
+    excess = limit_excess(problem, q, qd, tau, nearest, most, own=clear.own.bound, qdd=qdd, jerk=jerk, pace=pace)
     return Audit(float(error.max()), float(turned.max()), excess, worst)  # type: ignore[arg-type]

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from pipeline.common.arrays import Array
 from pipeline.evaluation.base import BaseMotion, angle_between, base_motion, entered_cycle
-from pipeline.evaluation.between import between_knots
+from pipeline.evaluation.between import between_knots, tool_pace
 from pipeline.evaluation.certified import Near, near, said
 from pipeline.evaluation.clearance import Clearance
 from pipeline.evaluation.curve import OffPath, off_path
@@ -158,7 +158,9 @@ def evaluate(problem: Problem, solution: Solution) -> Evaluation:
     clear = near(problem, distances, whole(problem, trajectory), time) if np.all(np.isfinite(q)) else Near()
     turn = angle_between(plant.start, way)
     own = own_at_knots(problem, distances, clear, q)
-    excess = limit_excess(problem, q, qd, tau, float(clearance.min()), float(turn.max()), own=own, qdd=qdd, jerk=jerk)
+    pace = tool_pace(problem, plant, trajectory, position, (qd, qdd))
+    nearest, most = float(clearance.min()), float(turn.max())
+    excess = limit_excess(problem, q, qd, tau, nearest, most, own=own, qdd=qdd, jerk=jerk, pace=pace)
     between = between_knots(problem, plant, clear, trajectory, qd[0])
     off = off_path(problem, plant, trajectory)
     secondary = np.array([plant.secondary(problem, qi) for qi in q]) if problem.objective.secondary else np.zeros(count)
@@ -208,8 +210,9 @@ def evaluate(problem: Problem, solution: Solution) -> Evaluation:
         energy_integral_spline=between.energy,
         tracking_error_between=off.distance,
         orientation_error_between=off.angle,
-        on_path=bool(
-            off.distance <= problem.reference.tolerance and off.angle <= problem.reference.orientation_tolerance
+        on_path=all(
+            error <= allowed * (1 + LIMITS)
+            for error, allowed in zip((off.distance, off.angle), problem.reference.tolerances, strict=True)
         ),
         clearance=clearance,
         near=clear,
@@ -269,6 +272,12 @@ def _judge_between(
         where = (
             f"between its knots the motion is up to {error:.2g} {unit} off its path (at t = {off.when[which]:.3g} s)"
         )
+        if not reference.exact:
+            if error > allowed * (1 + LIMITS):
+                said = f"up to {error:.3g} {unit} off its path (at t = {off.when[which]:.3g} s)"
+                said = f"{said}, outside the tube of path.{key} = {allowed:g} {unit}"
+                return Status.UNCONFIRMED, "; ".join([said, *notes])
+            continue
         if solution.knots_only and error > own.max() + max(allowed, strays(problem)[which]):
             return Status.UNCONFIRMED, "; ".join([f"{where}: too few knots to show it ({solution.grid})", *notes])
         if error > own.max() + allowed and not solution.knots_only:

@@ -22,12 +22,14 @@ def limit_excess(
     own: float = np.inf,
     qdd: Array = STILL,
     jerk: Array = STILL,
+    pace: Array | None = None,
 ) -> dict[str, float]:
     """By how much each kind of limit is exceeded, relative to its size (positions: to half the range; clearances: to
     the margin); <= 0 if kept. clearance, own [m]: from obstacles, of the arm from itself. turn [rad]: of the base from
-    its start.
+    its start; pace (K, 2): of the tool, [m/s] and [m/s^2].
     """
-    if not (problem.constrained or problem.keeps_clear) or not np.all(np.isfinite(q)):
+    limited = problem.constrained or problem.keeps_clear or problem.bounds.limits_tool
+    if not limited or not np.all(np.isfinite(q)):
         return {}
     found = {kind: float(excess.max()) for kind, excess in excesses(problem, q, qd, tau, qdd, jerk).items()}
     if problem.obstacles is not None:
@@ -36,7 +38,14 @@ def limit_excess(
         found["self_clearance"] = 1 - own / problem.own.margin
     if np.isfinite(problem.bounds.attitude):
         found["attitude"] = turn / problem.bounds.attitude - 1
-    return found
+    return found | {kind: float(excess.max()) for kind, excess in of_tool(problem, pace).items()}
+
+
+def of_tool(problem: Problem, pace: Array | None) -> dict[str, Array]:
+    """The same (K,) of the limits of its pace (K, 2), where it has any."""
+    bounds = {"tool_speed": problem.bounds.tool_speed, "tool_acceleration": problem.bounds.tool_acceleration}
+    limited = {kind: (own, bound) for own, (kind, bound) in enumerate(bounds.items()) if np.isfinite(bound)}
+    return {} if pace is None else {kind: pace[:, own] / bound - 1 for kind, (own, bound) in limited.items()}
 
 
 def excesses(

@@ -93,6 +93,15 @@ class SinglePlant:
     def tip(self) -> Array:
         return np.asarray(self.end.CalcPoseInWorld(self.context).translation())
 
+    def pace(self, task: Task, qdd: Array) -> tuple[float, float]:
+        """Speed [m/s] and acceleration [m/s^2] of the prescribed coordinates, by their vectors' lengths."""
+        world = self.plant.world_frame()
+        given = (self.context, JacobianWrtVariable.kV, self.end, np.zeros(3), world, world)
+        jacobian = self.plant.CalcJacobianTranslationalVelocity(*given)[task.rows]
+        bias = self.plant.CalcBiasTranslationalAcceleration(*given).ravel()[task.rows]
+        speed = jacobian @ self.plant.GetVelocities(self.context)
+        return float(np.linalg.norm(speed)), float(np.linalg.norm(jacobian @ qdd[self.place] + bias))
+
     def skeleton(self) -> Array:
         return np.array(
             [joint.frame_on_child().CalcPoseInWorld(self.context).translation() for joint in self.joints[self.nb :]]

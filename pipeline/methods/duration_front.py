@@ -12,7 +12,7 @@ import numpy as np
 from pipeline.config.methods import GlobalOptions, ParetoOptions
 from pipeline.methods.global_planner.optimum import confirmed
 from pipeline.methods.global_planner.planner import global_planner
-from pipeline.methods.global_planner.smooth import TRACKING, Searches
+from pipeline.methods.global_planner.smooth import Searches, promised
 from pipeline.methods.global_planner.timed import Record, cheapest, recorded
 from pipeline.methods.method import Context
 from pipeline.path.reference import Reference
@@ -77,7 +77,7 @@ def solve(problem: Problem, options: ParetoOptions, context: Context) -> list[So
                     path,
                     Status.SOLVED,
                     optimum=rank,
-                    tracking_tolerance=own.tolerance if problem.zero_acceleration else TRACKING,
+                    tracking_tolerance=promised(problem),
                     limits_kept=LIMIT_KINDS,
                     evidence=evidence,
                     reference=own,

@@ -11,7 +11,7 @@ from pipeline.common.workers import Workers
 from pipeline.problem.integrals import INTEGRALS
 from pipeline.problem.lagrangian import Lagrangian
 from pipeline.problem.problem import Boundary, Problem
-from pipeline.problem.solution import Progress, Solution, no_progress
+from pipeline.problem.solution import Progress, Solution, no_phase, no_progress
 
 ALL_BOUNDARIES = frozenset(Boundary)
 
@@ -25,6 +25,7 @@ class Serves:
     limits or obstacles. orientation: whether the task may prescribe one. moving_base: whether the arm may stand on a
     base that floats, or that is held so that what it feels can count. rest: whether the joints may be
     told to rest at an end, or their accelerations and jerks be limited. timing: whether the timing may be left to it.
+    tube: whether the path may be one that need not be kept exactly.
     """
 
     redundancy: int | None = None
@@ -35,12 +36,15 @@ class Serves:
     moving_base: bool = True
     rest: bool = True
     timing: bool = False
+    tube: bool = False
 
     def why_not(self, problem: Problem) -> str | None:
         """The first condition that `problem` does not meet and what is supported, without full stop; None if served."""
         why = self._unmet(problem)
         if why is None and not self.timing and problem.free_timing:
             return "timing.law = optimal and timing.duration = shortest are found by the method global alone"
+        if why is None and not self.tube and not problem.reference.exact:
+            return "path.exact = false is used by the method global, and by the front of path_tolerance, alone"
         return _contradiction(problem) if why is None else f"{why}; supported {self}"
 
     def _unmet(self, problem: Problem) -> str | None:
@@ -79,7 +83,7 @@ class Serves:
         if not self.moving_base:
             parts.append("arms on a fixed base")
         if not self.rest:
-            parts.append("motions without boundary.rest and limits of acceleration or jerk")
+            parts.append("motions without rest at an end (boundary.rest=[]) and limits of acceleration or jerk")
         return "are " + "; ".join(parts) if parts else "is every problem"
 
 
@@ -95,17 +99,21 @@ def _contradiction(problem: Problem) -> str | None:
 
 
 ANY = Serves()
-WITH_TIMING = Serves(timing=True)
+WITH_TIMING = Serves(timing=True, tube=True)
 ON_KNOTS = Serves(rest=False)  # by differences, which know no rest
 
 
 @dataclass(frozen=True)
 class Context:
-    """What a run shares with its methods: the seed of every random draw, the workers, and whom progress is told."""
+    """What a run shares with its methods: the seed of every random draw, the workers, and whom progress is told.
+
+    phase: told in a few words what begins.
+    """
 
     seed: int = 1
     workers: Workers = field(default_factory=Workers)
     progress: Progress = no_progress
+    phase: Callable[[str], None] = no_phase
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from scipy.spatial.distance import squareform
 
 from pipeline.common.arrays import Array
 from pipeline.config.methods import ParetoOptions
-from pipeline.methods import duration_front
+from pipeline.methods import duration_front, tolerance_front
 from pipeline.methods.global_planner.grids import finer
 from pipeline.methods.global_planner.optimum import stays_on_path
 from pipeline.methods.global_planner.planner import TRACKING, global_planner
@@ -73,6 +73,9 @@ def solve(problem: Problem, options: ParetoOptions, context: Context) -> list[So
     """
     if duration_front.DURATION in options.objectives:
         return duration_front.solve(problem, options, context)
+    if tolerance_front.TOLERANCE in options.objectives:
+        return tolerance_front.solve(problem, options, context)
+    options = _by_differences(options)
     while True:
         solutions = _front(problem, options, context)
         time = solutions[0].trajectory.time
@@ -81,6 +84,12 @@ def solve(problem: Problem, options: ParetoOptions, context: Context) -> list[So
         if times is None:
             return solutions
         problem = replace(problem, times=times)
+
+
+def _by_differences(options: ParetoOptions) -> ParetoOptions:
+    """The points of a front are by differences, and so are the planner's motions unless a spline is asked for."""
+    planner = options.planner
+    return replace(options, planner=replace(planner, transcription=planner.transcription or "differences"))
 
 
 def _front(problem: Problem, options: ParetoOptions, context: Context) -> list[Solution]:
@@ -131,11 +140,15 @@ def refuses(problem: Problem, options: ParetoOptions) -> str | None:
     if len(options.objectives) != 2:
         return f"method.pareto.objectives = [{', '.join(options.objectives)}]: a front is one of two integrals"
     if duration_front.DURATION in options.objectives:
+        if tolerance_front.TOLERANCE in options.objectives:
+            return "method.pareto.objectives = [duration, path_tolerance]: one of them goes with an integral"
         return duration_front.refuses(problem, options)
+    if tolerance_front.TOLERANCE in options.objectives:
+        return tolerance_front.refuses(problem, options)
     if why := ON_KNOTS.why_not(problem):
         return why
     each = (replace(problem, objective=Objective({name: 1.0})) for name in options.objectives)
-    return next((why for own in each if (why := global_planner.why_not(own, options.planner))), None)
+    return next((why for own in each if (why := global_planner.why_not(own, _by_differences(options).planner))), None)
 
 
 pareto = Method("pareto", "Pareto point", "#2F855A", ParetoOptions, WITH_TIMING, solve, refuses)

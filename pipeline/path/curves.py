@@ -63,7 +63,7 @@ class Arc:
     """An arc from `start` (m,) around a centre at `radius` [m] along the unit vector `to_center` (m,).
 
     `heading` (m,) is the unit tangent at the start, at right angles to `to_center`; `angle` [rad] is the arc's extent
-    (2 pi: a circle).
+    (2 pi: a circle). `rise` (m,) [m]: by how much it ends beside its plane, as a helix; zero or None: not at all.
     """
 
     start: Array
@@ -71,17 +71,20 @@ class Arc:
     heading: Array
     radius: float
     angle: float = 2 * np.pi
+    rise: Array | None = None
 
     @property
     def length(self) -> float:
-        return self.radius * self.angle
+        return float(np.hypot(self.radius * self.angle, 0.0 if self.rise is None else np.linalg.norm(self.rise)))
 
     def sample(self, s: Array) -> tuple[Array, Array, Array]:
-        phi = (s / self.radius)[:, None]
+        share = self.radius * self.angle / self.length  # of the length, in the plane
+        slope = np.zeros_like(self.start) if self.rise is None else self.rise / self.length
+        phi = (share * s / self.radius)[:, None]
         inward, along = self.to_center, self.heading
-        x = self.start + self.radius * ((1 - np.cos(phi)) * inward + np.sin(phi) * along)
-        tangent = np.sin(phi) * inward + np.cos(phi) * along
-        return x, tangent, (np.cos(phi) * inward - np.sin(phi) * along) / self.radius
+        x = self.start + self.radius * ((1 - np.cos(phi)) * inward + np.sin(phi) * along) + s[:, None] * slope
+        tangent = share * (np.sin(phi) * inward + np.cos(phi) * along) + slope
+        return x, tangent, share**2 * (np.cos(phi) * inward - np.sin(phi) * along) / self.radius
 
 
 def circle(

@@ -16,7 +16,8 @@ from pipeline.path.timing import Timing
 class Reference:
     """The end-effector motion to follow: a geometry, with or without orientations, run through under a timing law.
 
-    tolerance [m], orientation_tolerance [rad]: how far from it a motion may be between its knots.
+    tolerance [m], orientation_tolerance [rad]: how far from it a motion may be between its knots; where it is not
+    `exact`, at any time: the path is then the centre of a tube.
     notes: what a user should know of the path, in sentences without a full stop.
     """
 
@@ -26,6 +27,12 @@ class Reference:
     tolerance: float = 1e-4
     orientation_tolerance: float = 1e-3
     notes: tuple[str, ...] = ()
+    exact: bool = True
+
+    @property
+    def tolerances(self) -> tuple[float, float]:
+        """[m] and [rad]."""
+        return self.tolerance, self.orientation_tolerance
 
     @property
     def duration(self) -> float:
@@ -44,6 +51,19 @@ class Reference:
             turned = self.orientation.sample(s)
             x, tangent, curvature = (np.hstack(pair) for pair in zip((x, tangent, curvature), turned, strict=True))
         return x, tangent, curvature
+
+    def paces(self, t: Array) -> tuple[float, float]:
+        """The largest speed [m/s] and acceleration [m/s^2] of its point at the times t (K,)."""
+        s, sd, sdd = self.timing.sample(np.asarray(t, dtype=float), self.geometry.length)
+        tangent, curvature = self.geometry.sample(s)[1:]
+        second = curvature * sd[:, None] ** 2 + tangent * sdd[:, None]
+        speed, acceleration = (np.linalg.norm(values, axis=1) for values in (tangent * sd[:, None], second))
+        return float(speed.max()), float(acceleration.max())
+
+    def within(self, share: float) -> Reference:
+        """The same path with so much of its tolerances."""
+        tolerance, orientation_tolerance = share * self.tolerance, share * self.orientation_tolerance
+        return replace(self, tolerance=tolerance, orientation_tolerance=orientation_tolerance)
 
     def slowed(self, by: float) -> Reference:
         """The same path in `by` times the time."""

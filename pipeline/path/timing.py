@@ -6,6 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import Protocol, Self, TypeVar
 
 import numpy as np
@@ -136,6 +137,54 @@ class WithStops(Scalable):
             out[:, rows] = part
             out[0, rows] += stops[i] * length
         return out[0], out[1], out[2]
+
+
+@dataclass(frozen=True)
+class Feeds:
+    """From stop to stop each move at a feed of its own, every change of it a raised cosine of the time T_a:
+
+    sdd = sum dv_j k(t - t_j),    k(t) = (1 - cos(2 pi t / T_a)) / T_a    on [0, T_a],
+
+    dv_j the change of speed after t_j at the feeds alone. So a rise takes T_a, and no speed is above all feeds that it
+    lies between. With one feed the law Cruise.
+
+    fractions (P,): of the length, from 0 to 1; spans (P - 1,) [s]: what each move takes at its feed; stops: indices;
+    ramp: T_a as a share of the time from stop to stop.
+    """
+
+    fractions: tuple[float, ...]
+    spans: tuple[float, ...]
+    stops: tuple[int, ...]
+    ramp: float
+    at_rest: bool = True
+
+    @property
+    def duration(self) -> float:
+        return sum(self.spans) / (1 - self.ramp)
+
+    def sample(self, t: Array, length: float) -> tuple[Array, Array, Array]:
+        out: Array = np.zeros((3, len(t)))
+        begins, breaks = 0.0, [0, *self.stops, len(self.spans)]
+        for first, last in pairwise(breaks):
+            spans = np.array(self.spans[first:last])
+            at = np.concatenate([[0.0], np.cumsum(spans)])
+            speed = np.diff(self.fractions[first : last + 1]) / spans
+            change = np.diff(speed, prepend=0.0, append=0.0)
+            rise = self.ramp / (1 - self.ramp) * at[-1]
+            rows = (t >= begins) if first else np.ones(len(t), dtype=bool)
+            u = np.maximum(t[rows, None] - begins - at, 0.0)
+            w = np.minimum(u, rise)
+            angle = 2 * np.pi * w / rise
+            moved = w**2 / (2 * rise) + rise * (np.cos(angle) - 1) / (4 * np.pi**2) + (u - w)
+            parts = (moved, w / rise - np.sin(angle) / (2 * np.pi), (1 - np.cos(angle)) / rise)
+            out[:, rows] = length * np.array([part @ change for part in parts])
+            out[0, rows] += length * self.fractions[first]
+            begins += at[-1] + rise
+        return out[0], out[1], out[2]
+
+    def slowed(self, by: float) -> Feeds:
+        """The same law in `by` times the time."""
+        return replace(self, spans=tuple(by * span for span in self.spans))
 
 
 @dataclass(frozen=True)

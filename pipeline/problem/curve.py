@@ -34,16 +34,19 @@ def curve(problem: Problem, time: Array, q: Array, ends: Array | None = None) ->
 
 def end_speeds(problem: Problem, trajectory: Trajectory) -> Array:
     """The joints' velocities (2, joints) [rad/s] with which a motion begins and ends that a path at rest asks to rest;
-    zero where it asks for none, as a cycle that is repeated or a path that is entered at speed.
+    zero where it asks for none, as a path that is entered at speed.
 
-    Of knots alone, those of the spline that nothing holds at its ends.
+    A cycle too is begun from rest. Of knots alone, those of the spline that closes smoothly, or else of the one that
+    nothing holds at its ends.
     """
-    joints = trajectory.q[:, problem.task.arm.base.count :]
-    if problem.boundary is Boundary.CYCLIC or not problem.reference.timing.at_rest:
+    time, joints = trajectory.time, trajectory.q[:, problem.task.arm.base.count :]
+    if not problem.reference.timing.at_rest:
         return np.zeros((2, joints.shape[1]))
     if trajectory.ends is not None:
         return trajectory.ends
-    return np.asarray(CubicSpline(trajectory.time, joints)(trajectory.time[[0, -1]], 1))
+    closes = problem.boundary is Boundary.CYCLIC and turns_of_cycle(problem, joints) is not None
+    spline = curve(problem, time, joints) if closes else CubicSpline(time, joints)
+    return np.asarray(spline(time[[0, -1]], 1))
 
 
 def turns_of_cycle(problem: Problem, q: Array) -> Array | None:

@@ -92,3 +92,7 @@ class Solution:
 
 def no_progress(done: int, total: int, best: float) -> None:
     """Say nothing."""
+
+
+def no_phase(words: str) -> None:
+    """Say nothing."""

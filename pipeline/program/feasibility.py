@@ -15,6 +15,7 @@ from pipeline.program.transcription import transcribe
 UNITS = {
     **{"position": "rad", "velocity": "rad/s", "acceleration": "rad/s^2", "jerk": "rad/s^3"},
     **{"torque": "N m", "power": "W", "clearance": "m", "self_clearance": "m", "attitude": "rad"},
+    **{"tolerance": "m", "orientation_tolerance": "rad", "tool_speed": "m/s", "tool_acceleration": "m/s^2"},
 }
 
 
@@ -31,7 +32,7 @@ class Violation:
 
     @property
     def bound(self) -> str:
-        return f"the {self.kind} limit of {self.joint} ({self.limit:.4g} {UNITS[self.kind]})"
+        return f"the {self.kind.replace('_', ' ')} limit of {self.joint} ({self.limit:.4g} {UNITS[self.kind]})"
 
     @property
     def extent(self) -> str:

@@ -51,6 +51,7 @@ class Lifted:
     w: NDArray[Any]  # (S, n) the velocities there, scaled
     weights: Array  # (S,) [s] of that sum
     left_out: tuple[int, ...] = ()  # knots at which the path is not asked for
+    tube: Array  # (N + 1, 2) the shares of the path's tolerances by which it may be left at the knots, if it may
 
     def __init__(
         self, problem: Problem, times: Array, guess: Array, *, elastic: Collection[str] = (), keep_off: float = 0.0
@@ -62,6 +63,7 @@ class Lifted:
         self.closed = problem.boundary is Boundary.CYCLIC
         self.dt = np.diff(times)
         self.x_ref = problem.reference.position(times)
+        self.tube = np.ones((len(times), 2))
         self.lagrangian = Lagrangian(problem.task, problem.objective)
         self.forces = lifted(problem)
         self.drake = MathematicalProgram()

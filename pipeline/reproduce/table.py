@@ -21,6 +21,7 @@ COLUMNS = (
     "recomputed",
     "relative_difference",
     "verdict",
+    "derived",
     "with_printed_masses",
     "note",
     "command",
@@ -32,7 +33,7 @@ def judge(row: Row, value: float) -> str:
     if row.found.timing and np.isfinite(value):
         return TIMING
     between = None if row.between is None else (row.between[0], row.between[1])
-    return verdict(row.printed, value, reading=row.reading, tolerance=row.tolerance, between=between, better=row.better)
+    return verdict(row.printed, value, reading=row.reading, between=between, better=row.better)
 
 
 def command(row: Row) -> str:
@@ -65,17 +66,22 @@ def compare(documents: Sequence[Document], runs: Runs) -> pd.DataFrame:
                     "recomputed": value,
                     "relative_difference": _difference(row, value),
                     "verdict": word,
+                    "derived": document.derived(row),
                     "with_printed_masses": masses.get((document.name, place.place, row.quantity), np.nan),
-                    "note": "; ".join(part for part in (_read_as(row), note, row.why) if part),
+                    "note": "; ".join(part for part in (_read_as(row), note) if part),
                     "command": command(row),
                 }
             )
     return pd.DataFrame(rows, columns=list(COLUMNS))
 
 
-def counts(table: pd.DataFrame) -> dict[str, int]:
-    """How many rows have each verdict, and how many wait for their run, if any do; computing times have none."""
-    found = {name: int((table["verdict"] == name).sum()) for name in (*VERDICTS, NOT_RUN)}
+def counts(table: pd.DataFrame, *, derived: bool = False) -> dict[str, int]:
+    """How many rows have each verdict, and how many wait for their run, if any do; computing times have none.
+
+    derived: of the ratios of numbers that have rows of their own, which are not counted with these.
+    """
+    counted = table["verdict"][table["derived"] == derived]
+    found = {name: int((counted == name).sum()) for name in (*VERDICTS, NOT_RUN)}
     return {name: count for name, count in found.items() if count or name in VERDICTS}
 
 

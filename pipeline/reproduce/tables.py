@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -39,10 +39,16 @@ def markdown(documents: Sequence[Document], table: pd.DataFrame) -> str:
 
 
 def sentence(table: pd.DataFrame) -> str:
-    """How many of each verdict, in words, and how many computing times stand beside."""
-    judged, timings = counts(table), int((table["verdict"] == TIMING).sum())
-    said = f"{sum(judged.values())} printed numbers: " + ", ".join(f"{count} {name}" for name, count in judged.items())
+    """How many of each verdict, in words, and how many ratios of these numbers and computing times stand beside."""
+    judged, ratios, timings = counts(table), counts(table, derived=True), int((table["verdict"] == TIMING).sum())
+    said = f"{sum(judged.values())} printed numbers: {_listed(judged)}"
+    if any(ratios.values()):
+        said += f"; {sum(ratios.values())} ratios of them, not counted again: {_listed(ratios)}"
     return said + f"; {timings} computing times, which are not judged" * (timings > 0)
+
+
+def _listed(judged: Mapping[str, int]) -> str:
+    return ", ".join(f"{count} {name}" for name, count in judged.items())
 
 
 def cells(row: dict[Any, Any]) -> list[str]:

@@ -17,16 +17,16 @@ def verdict(
     recomputed: float,
     *,
     reading: str = "",
-    tolerance: float | None = None,
     between: tuple[float, float] | None = None,
     better: str = "neither",
 ) -> str:
     """`reproduced`, `better`, `misprint` or `differs`, in this order of preference but for `better`.
 
-    reproduced: within the rounding of the printed digits, or within `tolerance` where one is given; where the document
-    says it in words, within the interval `between` that the words stand for.
-    misprint: not so, but within the same of `reading`, another way to read what is printed.
-    better: the value lies on the `better` side (lower, higher) of the printed one, beyond its rounding.
+    reproduced: within the rounding of the printed digits, nothing wider; where the document says it in words, within
+    the interval `between` that the words stand for.
+    misprint: not so, but within the rounding of `reading`, another way to read what is printed.
+    better: the value lies on the `better` side (lower, higher) of the printed one, beyond its rounding; only what the
+    document minimises or maximises has such a side.
     differs: all else, a value that is not finite included.
     """
     if not math.isfinite(recomputed):
@@ -35,8 +35,7 @@ def verdict(
         return REPRODUCED if between[0] <= recomputed <= between[1] else DIFFERS
 
     def fits(text: str) -> bool:
-        allowed = half_width(text) if tolerance is None else tolerance
-        return abs(recomputed - float(text)) <= allowed * _EDGE
+        return abs(recomputed - float(text)) <= half_width(text) * _EDGE
 
     if fits(printed):
         return REPRODUCED

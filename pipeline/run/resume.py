@@ -28,8 +28,8 @@ def inputs(config: RunConfig) -> dict[str, str]:
     files |= {f"robot.urdf: {name}": file for name, file in formats.files(robot).items() if file != robot}
     if isinstance(config.path, WaypointsConfig):
         files["path.file"] = find(config.path.file, "path.file")
-    if config.limits.file is not None:
-        files["limits.file"] = find(config.limits.file, "limits.file")
+    limits = {"limits.file": config.limits.file, "robot.limits": config.robot.limits}
+    files |= {key: find(name, key) for key, name in limits.items() if name is not None}
     if config.identification.run:
         files |= {f"conf/reproduction/{name}.yaml": FOLDER / f"{name}.yaml" for name in config.identification.documents}
     return {key: hashlib.sha256(file.read_bytes()).hexdigest() for key, file in files.items()}

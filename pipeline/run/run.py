@@ -8,7 +8,6 @@ from typing import Any
 
 from pipeline.artifacts.artifacts import ARTIFACTS, name, write
 from pipeline.artifacts.report import Report
-from pipeline.artifacts.summary import summary
 from pipeline.common.versions import versions
 from pipeline.common.workers import Workers
 from pipeline.config.run import RunConfig
@@ -32,15 +31,17 @@ def run(config: RunConfig, folder: Path) -> int:
         problem, made = state(config), facts(config)
         workers = Workers(config.parallel.workers, folder / UNFINISHED, config.parallel.address, config.parallel.wait)
         workers.check()
-    with stages("solve"), console.progress(config.name) as progress:
-        solutions, seconds = solve(problem, config, Context(config.seed, workers, progress))
+    with stages("solve"), console.progress(config.name) as (progress, phase):
+        solutions, seconds = solve(problem, config, Context(config.seed, workers, progress, phase))
+    console.phase(config.name, "evaluating")
     with stages("evaluate"):
         problem = solutions[0].posed(problem)  # where its timing was to be found, with that of the best
         motions = Motions(config, problem, [evaluate(problem, solution) for solution in solutions], workers)
     with stages("studies"):
         results = tuple(result for study in STUDIES if (result := study(motions)) is not None)
     report = Report(motions, results, seconds, stages.seconds, made)
-    console.report(summary(report), results)
+    console.report(report)
+    console.phase(config.name, "writing and drawing")
     for artifact in ARTIFACTS:
         with stages(name(artifact)):
             write(artifact, report, folder)

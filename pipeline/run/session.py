@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shutil
 import sys
 import uuid
 from collections.abc import Iterator
@@ -55,6 +56,8 @@ class Session(Callback):
         from pipeline.run.unused import require_motion
 
         require_motion(asked)
+        if asked.artifacts.animation == "mp4" and shutil.which("ffmpeg") is None:
+            raise ConfigError("artifacts.animation = mp4: needs the program ffmpeg; gif needs none")
         keep(asked)
         Workers(address=asked.parallel.address).check()
 
@@ -90,6 +93,11 @@ class Session(Callback):
         runs = [mark.parent for mark in marks]
         with _refusing():
             sweep.write(folder, runs)
+            if any((run / "report.html").is_file() for run in runs):
+                from pipeline.artifacts.page import several  # where nobody wrote a page, nobody waits for its template
+
+                ordered = sweep.in_order(runs)
+                several.write(folder, f"Sweep {folder.name}", ordered, [run.name for run in ordered])
         exit_code = max(map(sweep.exit_code, runs), default=0)
 
 

@@ -16,6 +16,7 @@ def solve(problem: Problem, config: RunConfig, context: Context) -> tuple[list[S
     solutions: list[Solution] = []
     seconds: dict[str, float] = {}
     for name in config.methods:
+        context.phase(METHODS[name].title)
         begin = time.perf_counter()
         solutions += METHODS[name](problem, config.method.of(name), context)
         seconds[name] = time.perf_counter() - begin

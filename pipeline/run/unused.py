@@ -6,7 +6,9 @@ import re
 from collections.abc import Sequence
 
 from pipeline.common.errors import ConfigError
+from pipeline.config.path import WaypointsConfig
 from pipeline.config.run import RunConfig
+from pipeline.path.gcode import SUFFIXES
 
 WORD = r"\+{0,2}([a-z_]+)\.([a-z_.]+)=.*"  # key=value of a group
 
@@ -42,10 +44,14 @@ def _why(group: str, key: str, config: RunConfig) -> str:
         return "" if first in runs else f"{first} does not run (methods = [{','.join(config.methods)}])"
     if group in ("closed_loop", "candidate_study", "identification") and first != "run":
         return "" if getattr(config, group).run else f"{group}.run = false"
+    gcode = isinstance(config.path, WaypointsConfig) and config.path.file.lower().endswith(SUFFIXES)
+    feeds = ("from_file",) if gcode and config.timing.law == "from_file" else ()
     nothing = {
         "export.rate": ("export.method = none", config.export.method == "none"),
         "timing.duration": ("timing.law = from_file", config.timing.law == "from_file"),
-        "timing.ramp": (f"timing.law = {config.timing.law}", config.timing.law != "cruise"),
+        "timing.ramp": (f"timing.law = {config.timing.law}", config.timing.law not in ("cruise", *feeds)),
+        "path.units": ("G20 and G21 say it in G-code", gcode),
+        "path.rapid": ("nothing is timed by the feeds of G-code", not feeds),
         "path.orientation_tolerance": ("robot.orientation = none", config.robot.orientation == "none"),
         "robot.pointing": (f"robot.orientation = {config.robot.orientation}", config.robot.orientation != "pointing"),
         "obstacles.margin": ("there are no obstacles.shapes", not config.obstacles.shapes),

@@ -13,8 +13,9 @@ from pipeline.common.arrays import Array
 from pipeline.config.options import options
 from pipeline.evaluation.between import Audit, audit
 from pipeline.evaluation.evaluation import Evaluation
-from pipeline.problem.curve import curve, end_speeds, whole
-from pipeline.problem.problem import Problem
+from pipeline.problem.curve import curve, end_speeds, turns_of_cycle, whole
+from pipeline.problem.problem import Boundary, Problem
+from pipeline.problem.turns import full_turns
 from pipeline.program.spline.program import why_not as unserved
 from pipeline.studies.study import Motions, Result
 
@@ -103,9 +104,6 @@ class Nothing(Result):
             "export.force=true writes the cheapest all the same."
         ]
 
-    def said(self) -> list[str]:
-        return self.section()
-
     def facts(self) -> Mapping[str, Any]:
         return {"refused": {f"{motion.method} {motion.optimum}": list(motion.faults) for motion in self.refused}}
 
@@ -124,7 +122,7 @@ def instead(motions: Motions, refused: Sequence[Resampled]) -> str:
     problem, said = motions.problem, []
     if not all(problem.rest) and problem.reference.timing.at_rest and unserved(problem) is None:
         words = ["boundary.rest=[start,end]"]
-        if unlimited_start(problem):
+        if unlimited_start(problem) and motions.config.robot.limits is None:
             words.append(f"limits.acceleration={suggested(problem):g}")
         own = f"{motions.config.name}{SENDABLE}"
         shipped = f", and so does +experiment={own}" * (own in options("experiment"))
@@ -200,6 +198,11 @@ def _faults(
         joint = int(speed.argmax())
         if speed[joint] > RESTS * most:
             faults.append(f"{said} ({names[joint]} at {speed[joint]:.3g} rad/s)")
+    joints = evaluation.q
+    if problem.boundary is Boundary.CYCLIC and turns_of_cycle(problem, joints) is None:
+        apart = np.abs(joints[-1] - joints[0] - full_turns(problem, joints[0], joints[-1]))
+        joint = int(apart.argmax())
+        faults.append(f"is no cycle ({names[joint]} ends {apart[joint]:.3g} rad from where it began)")
     for kind, excess in checked.limit_excess.items():
         if excess > TOLERANCE:
             time, joint_name = worst[kind]
@@ -209,7 +212,7 @@ def _faults(
         (checked.tracking_error, reference.tolerance, "m", "tolerance"),
         (checked.orientation_error, reference.orientation_tolerance, "rad", "orientation_tolerance"),
     ):
-        if not error <= allowed:
+        if not error <= allowed * (1 + TOLERANCE):
             faults.append(f"is up to {error:.2g} {unit} off its path, more than path.{key} = {allowed:g} {unit}")
     return faults
 

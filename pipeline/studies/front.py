@@ -19,7 +19,7 @@ from pipeline.studies.study import Motions, Result
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-DURATION = "duration"  # beside the integrals
+DURATION, TOLERANCE = "duration", "path_tolerance"  # beside the integrals
 EQUAL = 1e-6  # relative: costs closer than this are the same
 FEW = 4  # motions between the extremes that figures show one by one
 
@@ -40,7 +40,7 @@ class Front(Result):
     @property
     def objectives(self) -> list[str]:
         """The two integrals that are traded, in the order of the table's columns."""
-        return [column for column in self.table.columns if column == DURATION or column in INTEGRALS]
+        return [column for column in self.table.columns if column in (DURATION, TOLERANCE, *INTEGRALS)]
 
     @property
     def share(self) -> float:
@@ -80,7 +80,7 @@ def table(front: Sequence[Evaluation]) -> pd.DataFrame:
     statistics = front[0].solution.statistics
     rows = pd.DataFrame(statistics["front"])
     names = statistics["objectives"]
-    costs = {e.solution.optimum: {name: _value(e, name) for name in names} for e in front}
+    costs = {e.solution.optimum: {name: cost(e, name) for name in names} for e in front}
     for name in names:
         rows[name] = [costs[point][name] if point in costs else np.nan for point in rows["point"]]
     bounded = [row[row["bounded"]] / row["bound"] - 1 if row["bounded"] else np.nan for row in rows.to_dict("records")]
@@ -114,12 +114,16 @@ def table(front: Sequence[Evaluation]) -> pd.DataFrame:
     ]
 
 
-def _value(motion: Evaluation, name: str) -> float:
-    return float(motion.time[-1]) if name == DURATION else motion.integral(name)
+def cost(motion: Evaluation, name: str) -> float:
+    """What `motion` costs by one of the integrals; its duration [s]; or its largest distance from the path [m]."""
+    own = {DURATION: float(motion.time[-1]), TOLERANCE: motion.tracking_error_between}
+    return own[name] if name in own else motion.integral(name)
 
 
-def _label(name: str) -> str:
-    return "motion time [s]" if name == DURATION else f"{INTEGRALS[name].label} [{INTEGRALS[name].unit}]"
+def label(name: str) -> str:
+    """Of an axis, with its unit."""
+    own = {DURATION: "motion time [s]", TOLERANCE: "largest distance from the path [m]"}
+    return own[name] if name in own else f"{INTEGRALS[name].label} [{INTEGRALS[name].unit}]"
 
 
 def dominated(values: Array) -> Array:
@@ -188,10 +192,13 @@ def draw(front: Front, name: str) -> Figure:
             arrowprops={"arrowstyle": "->"},
         )
     axes.set(
-        xlabel=_label(x),
-        ylabel=_label(y),
+        xlabel=label(x),
+        ylabel=label(y),
         title=f"{name}: Pareto front, hypervolume {front.share:.3f} of the extremes' rectangle",
     )
+    for name, scale in ((x, axes.set_xscale), (y, axes.set_yscale)):
+        if name == TOLERANCE:  # from a motion on its path to one that is as far off as it may be
+            scale("log")
     axes.grid(True, color="0.93")
     axes.set_axisbelow(True)
     axes.legend(fontsize=9)

@@ -17,6 +17,16 @@ JOINT_COLORS = ("#1F5FBF", "#C62828", "#D9A400", "#2E8B57", "#7B3FA0", "#00838F"
 UNKNOWN = "#44403C"
 
 
+# In the order of the registry, so that LSV, PMKE and the planner, which often coincide, differ.
+DASHES: tuple[str | tuple[int, tuple[float, ...]], ...] = (
+    "-",
+    (0, (1, 1.2)),
+    (0, (6, 2)),
+    (0, (3, 1.5)),
+    (0, (4, 2.5)),
+)
+
+
 FRONT = 19  # points after the first over which a front's hues run from blue to red
 
 
@@ -36,6 +46,13 @@ def color(label: str) -> str:
     keep = max(0.75 ** (optimum - 1), 0.35)
     channels = (int(base[i : i + 2], 16) for i in (1, 3, 5))
     return "#" + "".join(f"{round(255 - keep * (255 - channel)):02X}" for channel in channels)
+
+
+def dashes(label: str) -> str | tuple[int, tuple[float, ...]]:
+    """The line style of a motion, by its method: baselines whole, everything else broken in its own way."""
+    method, _ = _split(label)
+    number = list(METHODS).index(method) if method in METHODS else 0
+    return DASHES[number % len(DASHES)]
 
 
 def name(label: str) -> str:

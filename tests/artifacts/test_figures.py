@@ -30,7 +30,7 @@ from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Solution, Status, Trajectory
 from pipeline.robot.shapes import Shape, capsule
 from pipeline.studies import style
-from tests.reports import report_of
+from tests.reports import report_of, three_motions
 
 NAMES = ["reference", "energy", "stroboscopic", "joints", "torques", "spectral_radius", "tracking"]
 EVENT = 6.4
@@ -126,7 +126,7 @@ def test_comparisons_draw_every_motion_in_its_colour(case: Case) -> None:
         assert drawn(integral, e.energy_integral, color)
         assert drawn(rate, e.kinetic_energy, color)
         assert drawn(radius, e.spectral_radius, color)
-        assert drawn(error, e.tracking_error, color)
+        assert drawn(error, np.maximum(e.tracking_error, 1e-12), color)  # nearer is rounding
         assert drawn(singular, e.singular_value, color)
     assert error.get_yscale() == "log"
 
@@ -282,3 +282,36 @@ def test_obstacles_are_drawn(case: Case) -> None:
     lifted = replace(motions[0], skeleton=motions[0].skeleton + 0.1 * np.arange(4)[:, None] * np.eye(3)[2])
     space = stroboscopic(among, [lifted], "run")
     assert len(space.axes[0].collections) == len(SOLIDS)
+
+
+def test_limits_are_drawn_with_an_entry_and_told_where_they_are_far() -> None:
+    """joint1 exceeds 0.1 rad/s, joint2 stays far below 9."""
+    report = three_motions()
+    figure = figures.joints(report.motions.problem, report.motions.evaluations, "run")
+    velocity = figure.axes[1]
+    levels = {
+        round(float(np.ravel(line.get_ydata())[0]), 6) for line in velocity.lines if len(set(line.get_ydata())) == 1
+    }
+    assert {-0.1, 0.1} <= levels
+    assert not {-9.0, 9.0} & levels
+    assert any("limits from 9 on, outside" in text.get_text() for text in velocity.texts)
+    named = [text.get_text() for text in figure.legends[0].texts]
+    assert named == [*report.motions.problem.task.arm.description.actuated, "Limits"]
+
+
+def test_the_clearance_stands_beside_its_margin() -> None:
+    report = three_motions()
+    problem, motions = report.motions.problem, report.motions.evaluations
+    figure = figures.clearance(problem, motions, "run")
+    assert figure is not None
+    (axes,) = figure.axes
+    for e in motions:
+        assert drawn(axes, e.clearance, style.color(e.label))
+    assert drawn(axes, np.array([0.02, 0.02]), "#C53030")
+    assert figures.clearance(replace(problem, obstacles=None), motions, "run") is None
+
+
+def test_styles_are_those_of_methods_whatever_their_order() -> None:
+    assert style.dashes("lsv") == "-"
+    assert len({style.dashes(name) for name in ("lsv", "inertia_weighted", "pmke", "global")}) == 4
+    assert style.dashes("global 2") == style.dashes("global")

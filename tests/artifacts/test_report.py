@@ -100,4 +100,5 @@ def test_the_record_has_the_facts_of_results_under_their_names(case: Case, tmp_p
 
 
 def test_run_json_is_written_last() -> None:
-    assert [name(artifact) for artifact in ARTIFACTS] == ["summary", "figures", "motion_files", "recording", "record"]
+    order = ["summary", "motion_files", "page", "figures", "recording", "animation", "record"]
+    assert [name(artifact) for artifact in ARTIFACTS] == order

@@ -66,7 +66,9 @@ def test_summary_is_one_row_per_motion(motions: list[Evaluation], summary: pd.Da
             assert row[f"peak_velocity_{j + 1}"] == np.abs(motion.qd[:, j]).max()
             assert row[f"peak_torque_{j + 1}"] == np.abs(motion.tau[:, j]).max()
             assert row[f"peak_power_{j + 1}"] == np.abs(motion.tau[:, j] * motion.qd[:, j]).max()
-        assert row["min_singular_value"] == motion.singular_value.min()
+        usable = motion.time <= (motion.solution.event_time or np.inf)  # as the figure marks it
+        assert row["min_singular_value"] == motion.singular_value[usable].min()
+        assert row["min_spectral_radius"] == motion.spectral_radius[usable].min()
 
 
 def test_printed_values_stand_beside_the_first_optimum_of_their_method(summary: pd.DataFrame) -> None:
@@ -110,7 +112,13 @@ def table_rows(text: str) -> list[list[str]]:
 
 def test_summary_for_people(motions: list[Evaluation], report: Report) -> None:
     text = tables.text(report)
-    rows = table_rows(text)
+    beside, details = text.split("## Energies")
+    assert [row[:2] for row in table_rows(beside)[2:]] == [
+        ["lsv", "singular"],
+        ["global", "solved"],
+        ["global 2", "solved"],
+    ]
+    rows = table_rows(details)
     assert rows[0] == ["", "lsv", "global", "global 2"]
     assert {len(row) for row in rows} == {4}
     by_name = {row[0]: row[1:] for row in rows}
@@ -123,7 +131,9 @@ def test_summary_for_people(motions: list[Evaluation], report: Report) -> None:
     assert "- **lsv**: met | one" in text
     assert f"- **global**: {Status.SOLVED.value}" in text
     assert "A paper. A note." in text
-    assert text.startswith("# mine\n")
+    assert text.startswith("# mine\n\n**Best found: global 1: LSV is singular at 6.00 s, peak acceleration ")
+    peaks = " ".join(by_name["joint2"][1].split(" rad/s, ")[0].split())
+    assert float(peaks) == pytest.approx(np.abs(motions[1].qd[:, 1]).max(), rel=0.01)
 
 
 def made(folder: Path, name: str, table: pd.DataFrame) -> None:

@@ -32,7 +32,10 @@ PANDA = ("robot=panda", "path.direction=[0,1,0]", "path.length=0.1")
             (*FREE, "objective.secondary=manipulability"),
             r"objective\.secondary: secondary criteria are for arms on a fixed",
         ),
-        ((*FREE, "base.linear_momentum=[0,0,1]"), r"base: a planar arm has linear momentum in x and y"),
+        *(
+            ((*FREE, f"base.{word}"), r"base: a planar arm has linear momentum in x and y")
+            for word in ("linear_momentum=[0,0,1]", "angular_momentum=[1,0,0]", "angular_momentum=[0,1,0]")
+        ),
         (
             (*FREE, "methods=[dynamic_programming]"),
             r"dynamic_programming: the base is floating; .* fixed base; .*"

@@ -80,6 +80,48 @@ def test_a_square_with_rounded_corners(tmp_path: Path) -> None:
     np.testing.assert_allclose(other.position(t), one.position(t), atol=1e-12)
 
 
+GCODE = "G21 G90\nG0 X50 Y10\nG1 X150 F600\nG3 X150 Y50 J20\nG1 X50 F1200\nM30\n"
+
+
+def milled(folder: Path, *words: str) -> Problem:
+    """100 mm at 10 mm/s, half a circle of 20 mm and 100 mm back at 20 mm/s, by a Panda."""
+    (folder / "part.nc").write_text(GCODE, encoding="utf-8")
+    arm = ("robot=panda", "robot.task=[x,y,z]", "path=waypoints", "path.relative=true")
+    return prepare(composed(*arm, f"path.file={folder / 'part.nc'}", *words))
+
+
+def test_gcode_at_its_feeds_with_stops(tmp_path: Path) -> None:
+    """Each move takes its time at its feed and, with ramp 0.2, a quarter of that more."""
+    reference = milled(tmp_path, "path.corners=stop", "timing=from_file", "timing.ramp=0.2").reference
+    half = np.pi * 0.02
+    assert reference.geometry.length == pytest.approx(0.2 + half)
+    assert reference.duration == pytest.approx((10 + half / 0.01 + 5) / 0.8)
+    assert reference.notes == ("the path comes to rest after lines 3, 4",)
+    x, xd, _ = reference.sample(np.array([0.0, 6.25, 12.5, 12.5 + half / 0.016, reference.duration]))
+    np.testing.assert_allclose(
+        x - x[0], [[0, 0, 0], [0.05, 0, 0], [0.1, 0, 0], [0.12, 0.02, 0], [0, 0.04, 0]], atol=1e-12
+    )
+    np.testing.assert_allclose(xd[[0, 2, 4]], 0.0, atol=1e-12)
+    np.testing.assert_allclose(xd[[1, 3]], [[0.01, 0, 0], [0, 0.01, 0]], atol=1e-12)
+
+
+def test_gcode_with_another_law_and_round_corners(tmp_path: Path) -> None:
+    reference = milled(tmp_path, "path.corners=blend", "path.blend=0.002", "timing.duration=9").reference
+    assert reference.duration == 9.0
+    assert reference.notes[-1] == "its feeds are not used, since timing.law = raised_cosine"
+    assert re.match(r"it leaves the moves of the file by up to [\d.]+e-05 m, after line [34]$", reference.notes[0])
+    for words, said in (
+        (("path.corners=spline",), "line 4: an arc, which path.corners = spline"),
+        (("path.corners=blend", "timing=optimal", "path.file=robots/none.nc"), "robots/none.nc"),
+    ):
+        with pytest.raises((ConfigError, PathError), match=said):
+            milled(tmp_path, *words)
+    (tmp_path / "part.nc").write_text("G1 X9\n", encoding="utf-8")
+    arm = ("robot=panda", "robot.task=[x,y,z]", "path=waypoints", "path.relative=true", "timing=from_file")
+    with pytest.raises(PathError, match=r"line 1: no feed F so far, and timing\.law = from_file asks for it$"):
+        prepare(composed(*arm, f"path.file={tmp_path / 'part.nc'}"))
+
+
 def test_a_turn_on_the_spot(tmp_path: Path) -> None:
     problem = prepare(composed(*POSE, "path=line", "path.length=0", "path.turn=[0,0,0.8]"))
     x, xd, _ = problem.reference.sample(np.linspace(0.0, 4.0, 9))

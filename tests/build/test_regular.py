@@ -16,8 +16,15 @@ BODY = (
     '<inertial><origin xyz="{com} 0 0"/><mass value="{mass}"/>'
     '<inertia ixx="0.001" iyy="0.008" izz="0.008" ixy="0" ixz="0" iyz="0"/></inertial>'
 )
+INERTIA = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 POINT = '<inertial><origin xyz="0.15 0 0"/><mass value="0.5"/></inertial>'
-WORDS = ("robot.end_effector=tool", "robot.q_init=[0.3,0.8,-1.2]", "path.length=0.15", "path.direction=120")
+WORDS = (
+    "robot.end_effector=tool",
+    "robot.q_init=[0.3,0.8,-1.2]",
+    "path.length=0.15",
+    "path.direction=120",
+    "boundary.rest=[]",
+)
 
 
 def planar(limit: str = 'velocity="5" effort="20"', last: str = BODY.format(com=0.15, mass=0.5)) -> str:
@@ -74,6 +81,25 @@ def test_a_lock_outside_its_limits(refusal: Callable[..., str]) -> None:
     assert "robot.locked.j3 = 9: outside the limits of the joint, -3.1 to 3.1" in refusal(
         planar(), *words, "limits=joint"
     )
+
+
+def test_a_wrist_that_is_light_is_no_fault(refusal: Callable[..., str]) -> None:
+    """A link of 0.1 mg on its own axis, the tool beyond it without mass: 1e-8 of the largest entry of M."""
+    inertia = "".join(f' {name}="{2e-8 if name[1] == name[2] else 0}"' for name in INERTIA)
+    light = f'<inertial><mass value="1e-7"/><inertia{inertia}/></inertial>'
+    assert refusal(planar(last=light)) == ""
+
+
+def test_two_joints_about_one_axis_are_regular_if_anything_lies_between(refusal: Callable[..., str]) -> None:
+    """1e-6 of what both move: the mass matrix's least eigenvalue is as small, and it is no rounding."""
+    bodies = BODY.format(com=0.15, mass=1)
+    apart, _, wrist = planar().rpartition('xyz="0.3 0 0"/><axis')
+    first, between, last = f'{apart}xyz="0 0 0"/><axis{wrist}'.split(bodies)
+    for size, taken in ((1e-8, True), (0.0, False)):
+        inertia = "".join(f' {name}="{size if name[1] == name[2] else 0}"' for name in INERTIA)
+        light = f'<inertial><mass value="{size}"/><inertia{inertia}/></inertial>'
+        answer = refusal(f"{first}{bodies}{between}{light}{last}", "path.length=0.001")
+        assert (answer == "") is taken, answer
 
 
 def test_a_root_that_no_body_is(refusal: Callable[..., str]) -> None:

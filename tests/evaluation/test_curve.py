@@ -91,15 +91,16 @@ def test_a_cycle_closes_up_to_full_turns_of_joints_without_limits() -> None:
     assert turns_of_cycle(limited, q) is None
 
 
-def test_only_a_motion_that_ends_is_asked_to_rest() -> None:
-    """Knots along a cubic: its own speeds at its ends; none where the same knots are a cycle, which is repeated."""
+def test_at_which_speeds_a_motion_begins_and_ends() -> None:
+    """Knots along a cubic: its own speeds at its ends. A cycle of sines: that at which it comes round."""
     problem = prepare(composed("path=circle", "timing.steps=12"))
     t = problem.times
     q = np.column_stack([t, 1 - t**2, 0.1 * t**3])
-    trajectory = Trajectory(t, q)
-    np.testing.assert_allclose(
-        end_speeds(problem, trajectory), [[1.0, 0.0, 0.0], [1.0, -2 * t[-1], 0.3 * t[-1] ** 2]], atol=1e-9
-    )
-    again = prepare(composed("path=circle", "timing.steps=12", "boundary=cyclic"))
-    assert again.reference.timing.at_rest
-    np.testing.assert_array_equal(end_speeds(again, trajectory), np.zeros((2, 3)))
+    ends = [[1.0, 0.0, 0.0], [1.0, -2 * t[-1], 0.3 * t[-1] ** 2]]
+    np.testing.assert_allclose(end_speeds(problem, Trajectory(t, q)), ends, atol=1e-9)
+    again = prepare(composed("path=circle", "timing.steps=48", "boundary=cyclic"))
+    t, rate = again.times, 2 * np.pi / again.times[-1]
+    q = np.column_stack([0.1 * np.sin(rate * t), 0.2 * np.cos(rate * t), 0 * t])
+    np.testing.assert_allclose(end_speeds(again, Trajectory(t, q)), [[0.1 * rate, 0, 0]] * 2, rtol=1e-4, atol=1e-9)
+    flying = prepare(composed("path=circle", "timing.steps=48", "boundary=cyclic", "timing=constant_speed"))
+    np.testing.assert_array_equal(end_speeds(flying, Trajectory(t, q)), np.zeros((2, 3)))

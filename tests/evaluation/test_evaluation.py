@@ -36,6 +36,8 @@ class Traced:
     tolerance: float = np.inf
     orientation_tolerance: float = np.inf
     duration: float = 3.0
+    exact: bool = True
+    tolerances: tuple[float, float] = (np.inf, np.inf)
 
     def position(self, t: Array) -> Array:
         return self.task.value(self.spline(t))

@@ -8,6 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 from pydrake.math import RollPitchYaw, RotationMatrix
+from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 from pipeline.build.problem import prepare
@@ -20,10 +21,14 @@ from pipeline.methods.lsv import inertia_weighted, lsv
 from pipeline.methods.method import Context
 from pipeline.methods.pmke.predictive import pmke
 from pipeline.methods.registry import METHODS
+from pipeline.model.arm import Arm
+from pipeline.model.coordinates import SPACE
+from pipeline.model.floating import Floating
 from pipeline.problem.costs import integrals
 from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Solution, Status, Trajectory
 from pipeline.program.feasibility import least_violation, violations
+from pipeline.robot.spacecraft import Spacecraft
 from tests.support import composed, robot, within_limits
 
 SIZES = ("starts=population", "configurations=8", "candidates=100", "optimised=2", "refine_to=null")
@@ -96,6 +101,10 @@ def test_the_path_error_is_of_second_order_in_the_step() -> None:
         joints = solution.trajectory.q[:, problem.task.arm.joints]
         found = integrate(problem, solution.trajectory.time, joints)
         errors.append(found.path_error)
+        moved = CubicSpline(solution.trajectory.time, joints)(found.time)
+        tip = found.position + found.rotation.apply(problem.task.arm.on_fixed_base.position(moved))
+        off = np.linalg.norm(tip[:, :2] - problem.reference.position(found.time), axis=1)
+        assert found.path_error == pytest.approx(off.max(), rel=1e-9)
     order = np.log2(np.array(errors[:-1]) / errors[1:])
     assert errors[-1] < 5e-6
     assert np.all((order > 1.8) & (order < 2.4)), order
@@ -114,6 +123,20 @@ def test_a_base_that_was_moved_is_noticed() -> None:
     assert spoiled.base.floating is not None
     assert honest.base.floating is not None
     assert spoiled.base.floating.path_error == pytest.approx(honest.base.floating.path_error)
+
+
+def test_a_craft_has_its_mass_where_it_is_said_to_be() -> None:
+    """In the root link's frame, which stands turned."""
+    where, moments = (0.05, -0.02, 0.1), []
+    for com in (where, (0.0, 0.0, 0.0)):
+        craft = Spacecraft(20.0, ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), com)
+        fixed = robot("panda", base_rpy=(0.3, -0.4, 0.5))
+        free = BasePlant(Arm(fixed.description, fixed.mounting, Floating(craft, SPACE)))
+        free.at(np.zeros(3), free.start[0], np.zeros(7), np.zeros(13))
+        mass = free.plant.CalcTotalMass(free.context)
+        moments.append(mass * free.plant.CalcCenterOfMassPositionInWorld(free.context))
+    turned = RotationMatrix(RollPitchYaw(0.3, -0.4, 0.5)).matrix()
+    np.testing.assert_allclose(moments[0] - moments[1], 20.0 * turned @ where, atol=1e-12)
 
 
 def test_the_turn_is_from_the_start_on() -> None:

@@ -62,3 +62,11 @@ def test_a_limit_on_one_side_alone_counts(limited: Problem, side: str) -> None:
     beyond = {"lower": LOWER - 0.1, "upper": UPPER + 0.1}[side][None]
     found = limit_excess(replace(limited, limits=limits), beyond, REST[:1], REST[:1])
     assert found == pytest.approx({"position": 0.1})  # in radians where there is no range
+
+
+def test_the_pace_of_the_tool(limited: Problem) -> None:
+    pace = np.array([[0.5, 1.0], [0.3, 2.0]])
+    asked = replace(limited, limits=replace(Limits.none(3), tool_speed=0.4, tool_acceleration=4.0))
+    found = limit_excess(asked, REST, REST, REST, pace=pace)
+    assert found == pytest.approx({"tool_speed": 0.25, "tool_acceleration": -0.5})
+    assert limit_excess(replace(asked, limits=Limits.none(3)), REST, REST, REST, pace=pace) == {}

@@ -9,6 +9,7 @@ from pipeline.evaluation.plant import SinglePlant
 from pipeline.model.arm import Arm
 from pipeline.model.coordinates import PLANE, SPACE, Coordinates
 from pipeline.model.floating import Floating
+from pipeline.model.task import PositionTask
 from pipeline.robot.mounting import Mounting
 from pipeline.robot.spacecraft import Spacecraft
 from tests.support import robot, within_limits
@@ -35,6 +36,22 @@ def test_a_base_that_drifts_has_the_momentum_it_was_given(name: str, rng: np.ran
             np.testing.assert_allclose(
                 np.concatenate([found.translational(), found.rotational()]), momentum, atol=1e-10
             )
+
+
+@pytest.mark.parametrize("axes", [("x", "y", "z"), ("x", "z")])
+def test_the_pace_of_the_tool_is_that_of_its_place(axes: tuple[str, ...], rng: np.random.Generator) -> None:
+    """Central differences of where it is along q(t) = q + qd t + qdd t^2 / 2."""
+    arm, h = robot("panda", base_rpy=(0.3, -0.4, 0.5)), 1e-4
+    task, plant = PositionTask(arm, axes), SinglePlant(arm)
+    q, qd, qdd = within_limits(arm, 1, rng)[0], rng.normal(size=7), rng.normal(size=7)
+    places = []
+    for t in (-h, 0.0, h):
+        plant.at(q + qd * t + qdd * t**2 / 2, qd)
+        places.append(plant.tip()[task.rows])
+    plant.at(q, qd)
+    speed, acceleration = plant.pace(task, qdd)
+    assert speed == pytest.approx(np.linalg.norm(places[2] - places[0]) / (2 * h), rel=1e-6)
+    assert acceleration == pytest.approx(np.linalg.norm(places[2] - 2 * places[1] + places[0]) / h**2, rel=1e-5)
 
 
 def _floating(name: str, mounting: Mounting, coordinates: Coordinates, momentum: tuple[float, ...]) -> Arm:

@@ -8,10 +8,13 @@ import pytest
 from pipeline.build.problem import prepare
 from pipeline.common.errors import ConfigError
 from pipeline.config.methods import GlobalOptions
+from pipeline.evaluation.evaluation import evaluate
 from pipeline.methods.global_planner.basins import basins
 from pipeline.methods.global_planner.optimum import Optimum
 from pipeline.methods.global_planner.planner import global_planner
+from pipeline.methods.global_planner.ranking import in_order
 from pipeline.methods.global_planner.starts import GENERATORS, Starts
+from pipeline.problem.solution import Solution, Status, Trajectory
 from tests.support import composed, free_line
 
 SMALL = {"nodes": 40, "configurations": 4, "candidates": 20, "optimised": 6}
@@ -95,6 +98,26 @@ def test_whole_turns_are_one_optimum_and_the_first_start_of_a_basin_dates_it() -
     assert found.barren == 1
     near = basins(problem, problem.times, ends(0.0, 0.5, 1.0, cost=2.0), 0.05, dearest=1.3)
     assert [optimum.cost for optimum in near.optima] == [2.0, 2.5]
+    below = basins(problem, problem.times, ends(0.0, 0.5, 1.0, cost=-2.0), 0.05, dearest=1.3)  # as a criterion makes it
+    assert [optimum.cost for optimum in below.optima] == [-2.0, -1.5]
+
+
+def test_optima_are_ranked_by_the_integral_and_not_by_the_sum_on_their_knots() -> None:
+    """The integrals are the evaluation's, which has a plant and a quadrature of its own."""
+    drawn = lots("population")
+    problem, motions = drawn.problem, drawn.first[:2]
+    told = [
+        evaluate(problem, Solution("global", Trajectory(problem.times, q), Status.SOLVED)).objective_spline
+        for q in motions
+    ]
+    dear, cheap = np.argsort(told)[::-1]
+    optima = [Optimum(motions[k], cost, True, "") for k, cost in ((dear, 1.0), (cheap, 1.01))]  # as sums mis-rank them
+    (first, why), (second, moved) = in_order(problem, optima)
+    assert (first, second) == (optima[1], optima[0])
+    assert float(why.split(", ")[1].split(";")[0]) == pytest.approx(told[cheap], rel=0.01)
+    assert why.endswith("by its sum on these knots, 1.01, it would be number 2")
+    assert moved.endswith("it would be number 1")
+    assert [said for _, said in in_order(problem, optima[::-1])] == ["", ""]
 
 
 def test_further_starts_stand_on_the_knots_asked_for() -> None:

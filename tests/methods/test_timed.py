@@ -15,10 +15,10 @@ from pipeline.config.methods import GlobalOptions
 from pipeline.evaluation.evaluation import evaluate
 from pipeline.methods.global_planner.planner import global_planner
 from pipeline.methods.global_planner.smooth import Searches
-from pipeline.methods.global_planner.timed import Timed, cheapest, settle, settled, timed
+from pipeline.methods.global_planner.timed import Timed, cheapest, recorded, settle, settled, timed
 from pipeline.methods.lsv import lsv
 from pipeline.methods.method import Context
-from pipeline.problem.limits import Limits
+from pipeline.problem.limits import LIMIT_KINDS, Limits
 from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Solution, Status, Trajectory
 from pipeline.program.spline.curve import Curve
@@ -111,6 +111,28 @@ def test_the_answer_is_judged_by_its_own_law(motion: Array) -> None:
     assert none.status is Status.INFEASIBLE
     said = float(none.message.split("shortest feasible duration ")[1].split()[0])
     assert said == pytest.approx(answer.reference.duration, rel=1e-2)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("free", [False, True])
+def test_the_pace_of_the_tool_is_kept_and_used(motion: Array, free: bool) -> None:
+    """Under the raised cosine 2 L / V; under a free law not much more than L / V + V / A, which is bang and bang.
+    Judged between the knots by the evaluation's own plant.
+    """
+    speed, acceleration = 0.3, 2.0 if free else np.inf
+    bounds = replace(PACE, tool_speed=speed, tool_acceleration=acceleration)
+    asked = line(limits=bounds, free_law=free, free_duration=True)
+    answer = settle((asked, OPTIONS), motion)
+    length = asked.reference.geometry.length
+    least = length / speed + speed / acceleration if free else 2 * length / speed
+    assert answer.converged
+    assert least <= answer.cost <= (1.06 if free else 1.005) * least
+    curve = answer.curve
+    one = Solution("global", Trajectory(curve.times, curve.q, curve.ends), Status.SOLVED, limits_kept=LIMIT_KINDS)
+    judged = evaluate(asked, replace(one, reference=recorded(answer).reference(asked)))
+    kinds = ["tool_speed", "tool_acceleration"][: 1 + free]
+    for kind in kinds:
+        assert -0.02 < judged.limit_excess_between[kind] <= 1e-6
 
 
 @pytest.mark.parametrize(

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from pipeline.common.arrays import Array
-from pipeline.path.timing import Cruise, Quintic, RaisedCosine, Stamped, Timing, WithStops
+from pipeline.path.timing import Cruise, Feeds, Quintic, RaisedCosine, Stamped, Timing, WithStops
 
 
 def knots() -> st.SearchStrategy[tuple[Array, Array]]:
@@ -82,3 +83,28 @@ def _is_the_derivative(law: Timing, t: Array) -> None:
     np.testing.assert_allclose((ahead[0] - behind[0]) / (2 * h), now[1], atol=1e-4 * scale)
     top = np.abs(now[2]).max() + 1e-9
     np.testing.assert_allclose((ahead[1] - behind[1]) / (2 * h), now[2], atol=1e-3 * top)
+
+
+def test_one_feed_is_a_cruise() -> None:
+    law = Feeds((0.0, 1.0), (3.0,), (), 0.3)
+    t = np.linspace(0.0, law.duration, 101)
+    for own, other in zip(law.sample(t, 2.0), Cruise(law.duration, 0.3).sample(t, 2.0), strict=True):
+        np.testing.assert_allclose(own, other, atol=1e-12)
+
+
+def test_feeds_are_reached_and_not_exceeded() -> None:
+    """0.2, 0.4 and 0.1 m/s over 0.6, 0.4 and 1 m, with a stop after the second: rises take a tenth of either part."""
+    law = Feeds((0.0, 0.3, 0.5, 1.0), (3.0, 1.0, 10.0), (2,), 0.1)
+    assert law.duration == pytest.approx(14.0 / 0.9)
+    t = np.linspace(0.0, law.duration, 20_001)
+    s, sd, _ = law.sample(t, 2.0)
+    _is_the_derivative(law, t)
+    assert s[[0, -1]] == pytest.approx([0.0, 2.0])
+    assert sd.min() >= -1e-12
+    for begin, end, speed in ((1.0, 2.9, 0.2), (3.5, 3.9, 0.4), (6.0, 14.0, 0.1)):
+        np.testing.assert_allclose(sd[(t > begin) & (t < end)], speed, atol=1e-12)
+    assert sd.max() == pytest.approx(0.4)
+    rest = 4.0 / 0.9
+    assert law.sample(np.array([rest]), 2.0)[0] == pytest.approx(1.0)
+    assert law.sample(np.array([rest]), 2.0)[1] == pytest.approx(0.0, abs=1e-12)
+    assert law.slowed(2.0).sample(2 * t, 2.0)[1] == pytest.approx(sd / 2)

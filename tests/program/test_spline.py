@@ -16,6 +16,7 @@ from pipeline.common.arrays import Array
 from pipeline.model.kinematics import project
 from pipeline.model.task import PoseTask
 from pipeline.path.orientation import Orientation
+from pipeline.path.spline import Spline as Bent
 from pipeline.problem.limits import Limits
 from pipeline.problem.objective import Objective
 from pipeline.problem.problem import Boundary, Problem
@@ -46,6 +47,13 @@ KINDS: dict[str, dict[str, Any]] = {
         "zero_acceleration": True,
     },
     "kinetic energy, free law": {"rest": BOTH, "free_law": True},
+    "kinetic energy, tube": {"rest": BOTH, "tube": 1e-3},
+    "kinetic energy, tube, free law": {"rest": BOTH, "free_law": True, "tube": 1e-3},
+    "kinetic energy, free law, pace of the tool": {
+        "rest": BOTH,
+        "free_law": True,
+        "limits": replace(Limits.none(3), tool_speed=0.07, tool_acceleration=0.03),
+    },
     "velocity norm, cyclic": {"objective": Objective({"velocity_norm": 1.0}), "boundary": Boundary.CYCLIC},
 }
 
@@ -55,7 +63,11 @@ def make(problem: Make, guess: Guess) -> Callable[..., Spline]:
     """Trajectory 3 with 12 intervals (bindings of 10 and 2 knots) or another number of them, one of KINDS."""
 
     def build(kind: str, intervals: int = 12, stretch: float = 0.0) -> Spline:
-        asked = replace(problem(3, intervals), **KINDS[kind])
+        more = dict(KINDS[kind])
+        tolerance, asked = more.pop("tube", None), problem(3, intervals)
+        if tolerance:
+            asked = replace(asked, reference=replace(asked.reference, exact=False, tolerance=tolerance))
+        asked = replace(asked, **more)
         return transcribe(asked, Curve.through(asked, asked.times, guess(asked)), stretch=stretch)
 
     return build
@@ -63,6 +75,10 @@ def make(problem: Make, guess: Guess) -> Callable[..., Spline]:
 
 def assert_derivatives(made: Spline, rng: np.random.Generator) -> None:
     x = made.drake.initial_guess() * (1 + 0.1 * rng.normal(size=made.drake.num_vars()))
+    x += 1e-4 * rng.normal(size=len(x))  # where unknowns start at zero, derivatives of squares are zero too
+    if made.law is not None:  # a path has no derivatives at its ends
+        own = made.drake.FindDecisionVariableIndices(made.law.s.ravel())
+        x[own] = np.clip(x[own], 0.01 * POSITION_SCALE, 0.99 * POSITION_SCALE)
     got, h = program_jacobian(made, x), 1e-6
     for way in rng.normal(size=(4, len(x))) * (np.abs(x) + 1e-3):
         expected = (program_value(made, x + h * way) - program_value(made, x - h * way)) / (2 * h)
@@ -83,8 +99,20 @@ def test_derivatives_of_the_whole_program_equal_central_differences(
     assert_derivatives(make(kind, 6), rng)
 
 
-def test_derivatives_where_the_motion_time_is_an_unknown(make: Callable[..., Spline], rng: np.random.Generator) -> None:
-    assert_derivatives(make("both, limits", 5, stretch=1.3), rng)
+@pytest.mark.parametrize("kind", ["both, limits", "kinetic energy, free law, pace of the tool"])
+def test_derivatives_where_the_motion_time_is_an_unknown(
+    make: Callable[..., Spline], rng: np.random.Generator, kind: str
+) -> None:
+    assert_derivatives(make(kind, 5, stretch=1.3), rng)
+
+
+def test_derivatives_of_a_curved_path_whose_law_is_free(problem: Make, guess: Guess, rng: np.random.Generator) -> None:
+    """One whose curvature changes: across it the tool accelerates by its speed."""
+    asked = replace(problem(3, 5), **KINDS["kinetic energy, free law, pace of the tool"])
+    start = asked.reference.geometry.sample(np.zeros(1))[0][0]
+    bent = Bent(start + np.array([[0.0, 0.0], [0.1, 0.05], [0.15, 0.2], [0.05, 0.3]]))
+    asked = replace(asked, reference=replace(asked.reference, geometry=bent))
+    assert_derivatives(transcribe(asked, Curve.through(asked, asked.times, guess(problem(3, 5)))), rng)
 
 
 def test_derivatives_for_a_pose_under_gravity(rng: np.random.Generator) -> None:

@@ -10,13 +10,15 @@ import pandas as pd
 import pytest
 
 from pipeline.config import documents
-from pipeline.config.found import Summary
+from pipeline.config.documents import half_width
+from pipeline.config.found import Peak, Simple, Summary, Validation
 from pipeline.reproduce import __main__ as reproduce
 from pipeline.reproduce.pages import index
 from pipeline.reproduce.recompute import recompute
 from pipeline.reproduce.results import ResultError
 from pipeline.reproduce.table import COLUMNS, command, compare, counts, judge
 from tests.reproduce.printed import asked, expected, runs_in
+from tests.support import ROOT
 
 
 @pytest.mark.slow
@@ -28,6 +30,42 @@ def test_every_verdict_is_recomputed(reproduced: Path) -> None:
     differing = [(one, other[3]) for one, other in zip(expected(), found, strict=True) if one != other]
     assert differing == []
     assert np.isfinite(table["recomputed"]).all()
+    assert counts(table) == {"reproduced": 37, "better": 4, "misprint": 5, "differs": 33}
+    assert counts(table, derived=True) == {"reproduced": 5, "better": 0, "misprint": 0, "differs": 9}
+
+
+@pytest.mark.slow
+def test_nedungadis_motions_from_the_planners_configurations(reproduced: Path) -> None:
+    """Mean joint differences beside an audit's in another code, which gives so many digits."""
+    table = runs_in(reproduced)["sim1_validation"].table("validation").set_index("planner_optimum")
+    found = table.loc[[1, 2, 4], "difference_from_planner_start"]
+    np.testing.assert_allclose(found, [0.0068, 0.0234, 0.0126], atol=6e-5)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("found", "said"),
+    [
+        (Peak("traj2", "lsv", 1), "LSV peak of joint 1 is 0.176"),
+        (Peak("traj2", "lsv", 3), "that of joint 3 is 0.548"),
+        (Peak("traj3", "lsv", 2, until=6.2), "downwards it reaches 0.207"),
+        (Summary("traj4", "global", 1, "kinetic_energy_integral"), '"global" 3.03e-2'),
+        (Summary("traj2", "pmke", 1, "kinetic_energy_integral"), "gives 3.92e-3"),
+        (Summary("traj3", "pmke", 1, "kinetic_energy_integral"), "and 6.93e-3"),
+        (Summary("sim1_validation", "global", 3, "kinetic_energy_integral"), "A fourth optimum, 0.0573"),
+        (Summary("sim3", "global", 1, "torque_integral"), "not optimal: 0.09066"),
+        (Summary("sim4", "global", 1, "torque_integral"), "and 0.09109"),
+        (Validation("sim1_validation", 1, "stationary_objective"), "stationary motions' 0.0527"),
+        (Validation("sim1_validation", 4, "stationary_objective"), "0.0560, 0.0666"),
+        (Peak("sim1_validation", "global", 1), "joint 1 is 1.564"),
+        (Summary("case4a", "pontryagin_as_printed", 1, "final_error"), "0.0253 and 0.0615"),
+        (Summary("case4b", "pontryagin_as_printed", 1, "final_error"), "to 0.0055"),
+    ],
+)
+def test_numbers_of_the_errata_are_those_of_its_commands(reproduced: Path, found: Simple, said: str) -> None:
+    assert said in (ROOT / "docs" / "errata.md").read_text(encoding="utf-8")
+    text = said.split()[-1]
+    assert abs(recompute(found, runs_in(reproduced)) - float(text)) <= half_width(text) * (1 + 1e-9)
 
 
 @pytest.mark.slow

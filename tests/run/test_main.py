@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -209,3 +210,9 @@ def test_a_table_that_is_given_whole_names_the_entry_that_is_not_known(
     assert answer.error.startswith("error: timing.durations: unknown key; did you mean duration?")
     answer = call(monkeypatch, capfd, "obstacles.shapes={ball:{kind:sphere}}")
     assert "obstacles.shapes.ball: entries are added with a plus, as +obstacles.shapes.ball=..." in answer.error
+
+
+def test_mp4_needs_ffmpeg(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(shutil, "which", lambda name: None)
+    answer = run("methods=[lsv]", "timing.steps=4", "artifacts.animation=mp4")
+    assert_refused(answer, "artifacts.animation = mp4: needs the program ffmpeg; gif needs none")

@@ -59,7 +59,7 @@ class TestTraj3:
         assert answer.error == ""
         assert "singular" in answer.out
         assert "error [m]" in answer.out  # units are no markup
-        assert "Exported: " in answer.out
+        assert answer.out.index("Send pmke 1: ") < answer.out.index("Exported: pmke 1 at 100 Hz")
         assert str(folder) in answer.out
 
     def test_every_file_of_the_contract(self, traj3: tuple[Answer, Path]) -> None:

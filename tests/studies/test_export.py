@@ -19,7 +19,7 @@ from pipeline.methods.global_planner.planner import global_planner
 from pipeline.model.obstacles import Obstacles
 from pipeline.path.timing import ConstantSpeed
 from pipeline.problem.limits import Limits
-from pipeline.problem.problem import Problem
+from pipeline.problem.problem import Boundary, Problem
 from pipeline.problem.solution import Solution, Status, Trajectory
 from pipeline.robot.shapes import Shape
 from pipeline.studies.export import Nothing, Resampled, instead, resample, sentence, study
@@ -213,6 +213,18 @@ def test_a_motion_that_ends_while_it_moves_or_off_its_path_is_not_sent(at_rest: 
     assert len(faults) == 2
     assert faults[0].startswith("ends while it moves (joint")
     assert "off its path, more than path.tolerance = 0.0001 m" in faults[1]
+
+
+def test_a_cycle_is_begun_from_rest_and_comes_back(cycle: Case, at_rest: Case) -> None:
+    """The path rests at its ends, the joints of the best cycle do not; and what does not close is none."""
+    motion = resample(*cycle, 50.0)
+    speed = np.abs(motion.qd[0])
+    joint = f"joint{int(speed.argmax()) + 1} at {speed.max():.3g} rad/s"
+    assert motion.faults[:2] == (f"starts with a jump of velocity ({joint})", f"ends while it moves ({joint})")
+    problem, open_motion = at_rest
+    faults = resample(replace(problem, boundary=Boundary.CYCLIC), open_motion, 50.0).faults
+    apart = np.abs(open_motion.q[-1] - open_motion.q[0])
+    assert faults == (f"is no cycle (joint{int(apart.argmax()) + 1} ends {apart.max():.3g} rad from where it began)",)
 
 
 def test_a_transcription_that_keeps_limits_between_knots_is_named(line: Case) -> None:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from pipeline.evaluation.evaluation import evaluate
+from pipeline.model.kinematics import project
 from pipeline.problem.limits import Limits
 from pipeline.problem.solution import Solution, Status, Trajectory
 from pipeline.studies.retiming import retimed, study
@@ -31,6 +32,18 @@ def test_torques_count() -> None:
     asked = replace(free_line(8), limits=replace(Limits.none(3), torque=np.full(3, 0.5)))
     half = replace(asked, limits=replace(Limits.none(3), torque=np.full(3, 0.125)))
     assert retimed(half, STRAIGHT) == pytest.approx(2 * retimed(asked, STRAIGHT), rel=1e-3)  # of time squared
+
+
+def test_the_pace_of_the_tool_counts() -> None:
+    """On a straight line up to the speed V with the acceleration A and down again: L / V + V / A, or 2 sqrt(L / A)."""
+    asked = free_line(4)
+    length = asked.reference.geometry.length
+    motion = [project(asked.task, np.array([[-0.389, 0.520, 0.190]]), asked.reference.along(np.zeros(1))[0])[0]]
+    for point in asked.reference.along(np.linspace(0.0, length, 101)[1:])[0]:
+        motion.append(project(asked.task, motion[-1], point[None])[0])
+    for speed, least in ((0.4, length / 0.4 + 0.4 / 2.0), (np.inf, 2 * np.sqrt(length / 2.0))):
+        bounds = replace(Limits.none(3), tool_speed=speed, tool_acceleration=2.0)
+        assert retimed(replace(asked, limits=bounds), np.concatenate(motion)) == pytest.approx(least, rel=1e-2)
 
 
 def test_it_is_made_where_it_is_asked_for() -> None:

@@ -26,7 +26,7 @@ COUNTS = {"four": 4, "line": 3}
 STARTS = 600
 BELOW = 1.5  # times the best: optima up to there are listed
 REACH = {"four": 0.95, "line": 0.75}  # [m] from the base
-PANDA = ("robot=panda", "limits=joint", "timing.duration=4", "timing.steps=100")
+PANDA = ("robot=panda", "boundary.rest=[]", "limits=joint", "timing.duration=4", "timing.steps=100")
 
 
 def draw(kind: str, rng: np.random.Generator) -> tuple[str, ...]:

@@ -26,7 +26,7 @@ def base(problem: Problem, evaluations: Sequence[Evaluation], name: str) -> Figu
     labels = ("Turn from the start [deg]", "Shift from the start [m]", r"$\int|\omega|^2\,dt$ [rad$^2$/s]")
     for axes, label in zip(panels, labels if floats else ("Force [N]", "Torque [N m]"), strict=True):
         axes.set_ylabel(label)
-    for i, e in enumerate(evaluations):
+    for e in evaluations:
         own = e.base
         if own.reaction is None:
             shift = np.linalg.norm(own.position - own.position[0], axis=1)
@@ -36,7 +36,7 @@ def base(problem: Problem, evaluations: Sequence[Evaluation], name: str) -> Figu
             curves = [np.linalg.norm(own.reaction[:, part], axis=1) for part in (slice(3), slice(3, 6))]
             legend = f"{style.name(e.label)}\npeaks {np.nanmax(curves[0]):.3g} N, {np.nanmax(curves[1]):.3g} N m"
         for number, (axes, values) in enumerate(zip(panels, curves, strict=True)):
-            draw_lines(axes, e, values, style.color(e.label), None if number else legend, i)
+            draw_lines(axes, e, values, style.color(e.label), None if number else legend, style.dashes(e.label))
     for axes in panels:
         axes.set_ylim(bottom=0.0)
     add_legend(figure, panels[0])

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from pipeline.artifacts.figures.base import base
 from pipeline.artifacts.figures.motions import (
     accelerations,
+    clearance,
     energy,
     joints,
     reference,
@@ -35,6 +36,7 @@ FIGURES: dict[str, Draw] = {
     "torques": torques,
     "spectral_radius": spectral_radius,
     "tracking": tracking,
+    "clearance": clearance,
     "base": base,
 }
 
@@ -57,4 +59,8 @@ def draw(report: Report) -> Iterator[tuple[str, Figure]]:
 
 def save(figure: Figure, file: Path) -> None:
     """One figure as PNG."""
+    layout = figure.get_layout_engine()
+    if layout is not None:  # by itself matplotlib would draw everything once more for it
+        layout.execute(figure)
+        figure.set_layout_engine("none")
     write_beside(file, partial(figure.savefig, format="png", dpi=DPI))

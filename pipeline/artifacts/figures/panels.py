@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
+from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
@@ -20,6 +22,8 @@ from pipeline.studies import style
 
 POINTS = 1001  # most points per line: more than a screen shows
 COLUMNS = 5  # most panels side by side
+FAR = 2.5  # times the largest value: limits beyond are told and not drawn
+LIMITED, BROKEN = "limited", (0, (2, 3))
 INK, PALE, EVENT, PATH = "#1A202C", "#D5D9DF", "#C53030", "#B83280"
 
 
@@ -27,31 +31,31 @@ Values = Callable[[Evaluation], Array]
 
 
 def by_joint(
-    title: str, evaluations: Sequence[Evaluation], *kinds: tuple[str, str, Values], bounds: Array | None = None
+    title: str,
+    joints: Sequence[str],
+    evaluations: Sequence[Evaluation],
+    *kinds: tuple[str, str, Values, Array | None],
 ) -> Figure:
-    """A column per motion, a row per kind (label, unit, values); many motions are broken into blocks of such rows.
+    """A column per motion, a row per kind (label, unit, values, bounds); many motions are broken into blocks of rows.
 
-    bounds (2, n) are drawn, broken lines in the joints' colours, into the row of the first kind.
+    bounds (2, n) of the joints, if any: broken lines in the joints' colours; those far outside are told instead.
     """
     blocks, columns = shape_of(len(evaluations))
     rows = blocks * len(kinds)
     figure = new_figure(title, 1.0 + columns * (4.4 if columns < 4 else 3.4), 1.2 + rows * 2.6)
     first: dict[str, Axes] = {}
+    noted: list[tuple[Axes, Evaluation, Array, str]] = []
     for i, e in enumerate(evaluations):
         block, column = divmod(i, columns)
-        for row, (label, unit, values) in enumerate(kinds):
+        for row, (label, unit, values, bounds) in enumerate(kinds):
             place = (block * len(kinds) + row) * columns + column + 1
             axes = figure.add_subplot(rows, columns, place, sharey=first.get(label))
             if label not in first:
                 first[label] = axes
                 limit_line(axes, evaluations, values)
             for joint, line in enumerate(values(e).T):
-                draw_lines(axes, e, line, style.joint_color(joint), f"Joint {joint + 1}")
-                for bound in () if bounds is None or row else bounds[:, joint]:
-                    if np.isfinite(bound):
-                        axes.axhline(bound, color=style.joint_color(joint), linestyle=(0, (2, 3)), linewidth=1.0)
-                        low, high = axes.get_ylim()
-                        axes.set_ylim(min(low, 1.05 * bound), max(high, 1.05 * bound))
+                draw_lines(axes, e, line, style.joint_color(joint), joints[joint])
+            limits(axes, bounds)
             axes.set_xlim(e.time[0], e.time[-1])
             if row == 0:
                 axes.set_title(style.name(e.label), color=style.color(e.method), fontweight="bold", fontsize=11)
@@ -61,21 +65,46 @@ def by_joint(
                 axes.set_ylabel(label)
             axes.tick_params(labelleft=column == 0, labelbottom=row == len(kinds) - 1)
             tidy(axes)
-            annotate(axes, e, values(e), unit)
+            noted.append((axes, e, values(e), unit))
+    for axes, e, shown, unit in noted:  # when every panel has its range: rows share it
+        annotate(axes, e, shown, unit)
     figure.align_ylabels()
     handles, labels = figure.axes[0].get_legend_handles_labels()
+    if any(axes.get_gid() == LIMITED for axes in figure.axes):
+        handles, labels = [*handles, Line2D([], [], color=INK, linestyle=BROKEN, linewidth=1.0)], [*labels, "Limits"]
     figure.legend(handles, labels, loc="outside lower center", ncols=min(len(labels), 4 * columns), frameon=False)
     return figure
 
 
-def draw_lines(axes: Axes, e: Evaluation, values: Array, shade: str, label: str | None = None, order: int = 0) -> None:
+def limits(axes: Axes, bounds: Array | None) -> None:
+    """Bounds (2, n) as broken lines; one that would press the motions flat is told in the corner instead."""
+    if bounds is None or not np.isfinite(bounds).any():
+        return
+    low, high = axes.get_ylim()
+    reach = FAR * max(abs(low), abs(high))
+    for joint, pair in enumerate(bounds.T):
+        for bound in pair[np.abs(pair) <= reach]:
+            axes.axhline(bound, color=style.joint_color(joint), linestyle=BROKEN, linewidth=1.0)
+            axes.set_gid(LIMITED)
+            low, high = min(low, bound), max(high, bound)
+    margin = 0.03 * (high - low)
+    axes.set_ylim(min(axes.get_ylim()[0], low - margin), max(axes.get_ylim()[1], high + margin))
+    outside = np.abs(bounds[np.isfinite(bounds) & (np.abs(bounds) > reach)])
+    if outside.size:
+        said = f"limits from {outside.min():.4g} on, outside"
+        axes.text(0.98, 0.02, said, transform=axes.transAxes, ha="right", va="bottom", fontsize=8, color="#5A6472")
+
+
+def draw_lines(
+    axes: Axes, e: Evaluation, values: Array, shade: str, label: str | None = None, dashes: Any = "-"
+) -> None:
     """One line over time (N + 1,); what comes after a singularity thin and dotted.
 
-    Lines of odd `order` are dashed and on top, so that two motions that coincide both stay visible.
+    dashes: of its method (`style.dashes`), so that two motions that coincide both stay visible; broken lines on top.
     """
     keep = thin(e.time)
     time, values, until = e.time[keep], values[keep], usable(e, e.time[keep])
-    dashes, above = ((0, (4, 2.5)), 2.1) if order % 2 else ("-", 2.0)
+    above = 2.0 if dashes == "-" else 2.1
     axes.plot(time[:until], values[:until], color=shade, linewidth=1.8, linestyle=dashes, zorder=above, label=label)
     if until < len(time):
         axes.plot(time[until - 1 :], values[until - 1 :], color=shade, linewidth=1.1, linestyle=":", alpha=0.8)

@@ -21,7 +21,8 @@ def surface(shape: Shape) -> Array:
     elif shape.kind == "cylinder":
         angle = np.linspace(0.0, 2 * np.pi, 25)
         rim = shape.size[0] * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=-1)
-        own = np.concatenate([rim + [0.0, 0.0, shape.size[1] / 2], rim - [0.0, 0.0, shape.size[1] / 2]])
+        up = np.array([0.0, 0.0, shape.size[1] / 2])
+        own = np.concatenate([rim + up, rim - up])
     else:
         u, v = np.meshgrid(np.linspace(0.0, 2 * np.pi, 25), np.linspace(0.0, np.pi, 14))
         ball = np.stack([np.cos(u) * np.sin(v), np.sin(u) * np.sin(v), np.cos(v)], axis=-1).reshape(-1, 3)

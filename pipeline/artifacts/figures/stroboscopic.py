@@ -77,7 +77,7 @@ def stroboscopic(problem: Problem, evaluations: Sequence[Evaluation], name: str)
             axes.set_aspect("equal")
             tidy(axes)
         else:
-            axes.set_box_aspect(high - low, zoom=0.88)
+            axes.set_box_aspect(high - low, zoom=1.2)
             axes.view_init(elev=22, azim=-55)
     bar = figure.colorbar(ScalarMappable(clock, TIME_RAMP), ax=panels, shrink=0.8, aspect=30, pad=0.02)
     bar.set_label("Time of the pose [s]")

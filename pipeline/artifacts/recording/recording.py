@@ -24,7 +24,7 @@ from pipeline.artifacts.recording.arm import columns, draw_arm
 from pipeline.artifacts.recording.blueprint import faded, pixels, rgba, slug
 from pipeline.artifacts.recording.stream import record
 from pipeline.artifacts.report import Report
-from pipeline.artifacts.scene import box, corners, outlines
+from pipeline.artifacts.scene import box, corners, outlines, path_in_world
 from pipeline.artifacts.summary import text
 from pipeline.common.arrays import Array
 from pipeline.evaluation.evaluation import Evaluation
@@ -103,7 +103,7 @@ def read_series(file: Path, entity: str) -> tuple[Array, Array]:
 
 
 def _layout(problem: Problem, evaluations: Sequence[Evaluation], picture: Path | None) -> Any:
-    points = [np.array([problem.task.arm.mounting.base_position]), _reference(problem)]
+    points = [np.array([problem.task.arm.mounting.base_position]), path_in_world(problem)]
     if problem.obstacles is not None:
         points.append(np.array([shape.position for shape in problem.obstacles.shapes]))
     points += [evaluation.skeleton[_finite(evaluation)].reshape(-1, 3) for evaluation in evaluations]
@@ -140,13 +140,6 @@ def _finite(evaluation: Evaluation) -> Any:
     return np.isfinite(evaluation.skeleton).all(axis=(1, 2)) & np.isfinite(evaluation.q).all(axis=1)
 
 
-def _reference(problem: Problem) -> Array:
-    """The prescribed path (201, 3) [m] in the world; what is not prescribed stays as at `q_init`."""
-    geometry = problem.reference.geometry
-    path = geometry.sample(np.linspace(0.0, geometry.length, 201))[0]
-    return problem.task.in_world(path, problem.task.arm.position(problem.q_init[None])[0])
-
-
 class _Fact:
     """One value of a property, typed on its own: `rr.AnyValues` holds a key to its first type for the whole process."""
 
@@ -171,7 +164,7 @@ def _facts(properties: Mapping[str, Any]) -> list[Any]:
 
 
 def _send_reference(recording: Any, problem: Problem) -> None:
-    path = _reference(problem)
+    path = path_in_world(problem)
     look = {"colors": REFERENCE, "radii": pixels(3.0)}  # wide and pale: it stays visible under the traces
     recording.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     recording.log("reference", rr.LineStrips3D([path], **look), static=True)

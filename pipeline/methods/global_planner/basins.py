@@ -37,14 +37,14 @@ def basins(
     """Of the optima on the knots `times` that `starts` ended in: those of which no two are closer than `same` [rad].
 
     Left out are those that between the knots leave the path by more than the share `jumps` of its length, and those
-    that cost more than `dearest` times the best of the others.
+    that cost more than `dearest` times the best of the others (`ceiling`).
     """
     converged = [number for number, start in enumerate(starts) if start.converged]
     left = np.array(sorted(converged, key=lambda number: starts[number].cost), dtype=int)
     q, revolute = np.array([starts[number].q for number in left]), problem.task.arm.description.revolute
     optima: list[Optimum] = []
     members, newest, jumping = [], -1, 0
-    while len(left) and (not optima or starts[left[0]].cost <= dearest * optima[0].cost):
+    while len(left) and (not optima or starts[left[0]].cost <= ceiling(optima[0].cost, dearest)):
         optimum = starts[left[0]]
         here = np.abs(wrap(q - q[0], revolute)).max(axis=(1, 2)) <= same
         if np.isinf(jumps) or stays_on_path(problem, times, optimum.q, jumps):
@@ -55,3 +55,10 @@ def basins(
             jumping += 1
         left, q = left[~here], q[~here]
     return Basins(optima, members, len(starts) - 1 - newest, jumping)
+
+
+def ceiling(best: float, times: float) -> float:
+    """The cost that is so many times the best: as far above it where that is negative, as a secondary criterion can
+    make it.
+    """
+    return best + (times - 1) * abs(best) if np.isfinite(times) else np.inf

@@ -17,14 +17,16 @@ from pipeline.common.arrays import Array
 from pipeline.config.methods import GlobalOptions
 from pipeline.methods import dynamic_programming
 from pipeline.methods.global_planner.apart import apart, keeps_own, without_own
-from pipeline.methods.global_planner.basins import Basins, basins
+from pipeline.methods.global_planner.basins import Basins, basins, ceiling
 from pipeline.methods.global_planner.batch import JUMPS, Batch
 from pipeline.methods.global_planner.grids import coarsest, finer, on_knots, refinement
 from pipeline.methods.global_planner.optimum import Optimum, go_on, optimise_start, refine
+from pipeline.methods.global_planner.ranking import in_order
 from pipeline.methods.global_planner.reasons import counted, no_feasible, no_optimum, no_start
 from pipeline.methods.global_planner.smooth import freer, nothing, rough, smooth, splined, unserved
 from pipeline.methods.global_planner.starts import Starts
 from pipeline.methods.global_planner.timed import timed
+from pipeline.methods.global_planner.tube import exactly, loosened
 from pipeline.methods.method import WITH_TIMING, Context, Method
 from pipeline.model.kinematics import wrap
 from pipeline.problem.limits import LIMIT_KINDS
@@ -57,7 +59,9 @@ HOPELESS = 0.1  # relative violation on a coarse grid from which on finer ones a
 def solve(problem: Problem, options: GlobalOptions, context: Context) -> list[Solution]:
     """The distinct optima found from these starts, best first."""
     if not splined(problem, options):
-        return by_differences(problem, options, context)
+        if problem.reference.exact:
+            return by_differences(problem, options, context)
+        return loosened(problem, by_differences(exactly(problem), options, context), options, context)
     found = by_differences((freer if problem.free_timing else rough)(problem), options, context)
     if not found[0].found and problem.constrained and not problem.free_timing:
         found = max(found, by_differences(freer(problem), options, context), key=lambda motions: motions[0].found)
@@ -81,6 +85,7 @@ def by_differences(problem: Problem, options: GlobalOptions, context: Context, l
         return [nothing(problem, Status.NOT_CONVERGED, too_coarse, {})]
     asked, problem = len(problem.times) - 1, replace(problem, times=times)
     grids = refinement(times, coarsest(problem, options.coarse_steps, STEPS if why is None else STEPS_ALONE))
+    context.phase("drawing starts")
     drawn = Starts(problem, grids[0], options, np.random.default_rng(context.seed))
     motions, log = drawn.first, drawn.log
     if lazy:
@@ -89,6 +94,7 @@ def by_differences(problem: Problem, options: GlobalOptions, context: Context, l
         return [nothing(problem, Status.INFEASIBLE, no_start(problem, log.get("drawn", 0)), log)]
 
     batch = Batch(problem, options) if why is None else None
+    context.phase(f"solving them on {len(grids[0]) - 1} intervals")
     log["solver"] = f"ipopt ({why})" if batch is None else batch.words
     while True:
         starts = _optimise_starts(problem, grids[0], options, motions, batch, context)
@@ -114,6 +120,7 @@ def by_differences(problem: Problem, options: GlobalOptions, context: Context, l
         for start in starts
     ]
     log["barren_starts"] = coarse.barren
+    context.phase("refining and confirming")
     problem, grids, refined = _to_the_end(problem, grids, options, coarse.optima, batch, context)
     log["grids"] = [len(grid) - 1 for grid in grids]
     found = [(fine, members) for fine, members in zip(refined, coarse.members, strict=True) if _good(fine)]
@@ -132,17 +139,18 @@ def by_differences(problem: Problem, options: GlobalOptions, context: Context, l
         why_not = no_optimum(problem, grids[0], starts, refined, coarse.jumping)
         return [nothing(problem, Status.NOT_CONVERGED, why_not, log)]
     members = {id(fine): count for fine, count in found}
-    ranked = basins(problem, problem.times, [fine for fine, _ in found], options.same_path).optima
+    ranked = in_order(problem, basins(problem, problem.times, [fine for fine, _ in found], options.same_path).optima)
     words = counted(len(ranked), len(starts), coarse.barren)
     solutions = []
-    for rank, fine in enumerate(ranked):
+    for rank, (fine, moved) in enumerate(ranked):
+        said = _said(problem, asked, options, [fine.q]) if rank == 0 else ""
         own = {"starts_in_basin": members[id(fine)], "solves": fine.solves}
         solutions.append(
             Solution(
                 "global",
                 Trajectory(problem.times, fine.q),
                 Status.SOLVED,
-                _said(problem, asked, options, [ranked[0].q]) if rank == 0 else "",
+                "; ".join(filter(None, (said, moved))),
                 optimum=rank + 1,
                 tracking_tolerance=TRACKING,
                 limits_kept=LIMIT_KINDS,
@@ -218,7 +226,7 @@ def _draw_on(
     while True:
         motions = drawn.further(max(0, min(len(starts), options.budget - len(starts))), grid)
         if len(motions):
-            dear = DEAREST * min(start.cost for start in starts if start.converged)
+            dear = ceiling(min(start.cost for start in starts if start.converged), DEAREST)
             fresh, done = batch.coarse(grid, motions, dear), _teller(context, len(motions), starts)
             for count, start in enumerate(fresh, 1):
                 done(count, start)

@@ -90,8 +90,11 @@ class Searches:
 
 
 def splined(problem: Problem, options: GlobalOptions) -> bool:
-    """Whether the motion is to be a spline: asked for by name, or by rest and limits that differences do not know."""
-    asks = any(problem.rest) or problem.bounds.smooth or problem.free_timing
+    """Whether the motion is to be a spline: asked for by name, by rest and limits that differences do not know, by a
+    tube, or by an obstacle, which is to be kept off between the knots too.
+    """
+    off = problem.obstacles is not None and why_not(problem) is None
+    asks = any(problem.rest) or problem.bounds.smooth or problem.free_timing or not problem.reference.exact or off
     return options.transcription == "spline" or (options.transcription is None and asks)
 
 
@@ -103,7 +106,7 @@ def unserved(problem: Problem, options: GlobalOptions) -> str | None:
     if any(problem.rest) or problem.bounds.smooth:
         return (
             "method.global.transcription = differences keeps neither boundary.rest nor limits.acceleration or "
-            "limits.jerk; set it to spline"
+            "limits.jerk; set it to spline, or boundary.rest=[] and no such limits"
         )
     return None
 
@@ -111,7 +114,8 @@ def unserved(problem: Problem, options: GlobalOptions) -> str | None:
 def rough(problem: Problem) -> Problem:
     """The problem without what differences do not know."""
     limits = replace(problem.bounds, acceleration=FREE, jerk=FREE)
-    given = replace(problem, rest=(False, False), zero_acceleration=False, limits=limits)
+    reference = replace(problem.reference, exact=True)
+    given = replace(problem, reference=reference, rest=(False, False), zero_acceleration=False, limits=limits)
     return replace(given, free_law=False, free_duration=False)
 
 
@@ -176,13 +180,21 @@ def smooth(problem: Problem, found: list[Solution], options: GlobalOptions, cont
                 Status.SOLVED,
                 "; ".join(filter(None, [found[0].message, more])) if rank == 0 else "",
                 optimum=rank + 1,
-                tracking_tolerance=problem.reference.tolerance if problem.zero_acceleration else TRACKING,
+                tracking_tolerance=promised(problem),
                 limits_kept=LIMIT_KINDS,
                 evidence=(words if rank == 0 else "") + confirmed(own.solves),
                 statistics={**(log if rank == 0 else {}), "spline_solves": own.solves, "cost": own.cost},
             )
         )
     return solutions
+
+
+def promised(problem: Problem) -> float:
+    """What a spline keeps of its path at all knots [m, rad]; that of a tube is judged everywhere."""
+    reference = problem.reference
+    if not reference.exact:
+        return float("inf")
+    return reference.tolerance if problem.zero_acceleration else TRACKING
 
 
 def refine(context: tuple[Problem, GlobalOptions], motion: Array) -> Smooth:
@@ -232,6 +244,7 @@ def shortest(context: tuple[Problem, GlobalOptions], start: Curve) -> Smooth:
 def room(problem: Problem, curve: Curve) -> float:
     """By how much a motion must be stretched so that it keeps its limits, if no gravity acts."""
     powers = {"velocity": 1, "acceleration": 2, "jerk": 3, "torque": 2, "power": 3}
+    powers |= {"tool_speed": 1, "tool_acceleration": 2}
     found = excesses(problem, curve)
     return max(
         (float(1 + found[kind].max()) ** (1 / power) for kind, power in powers.items() if kind in found), default=1.0

@@ -13,7 +13,7 @@ import numpy as np
 from pipeline.common.arrays import Array
 from pipeline.config.methods import GlobalOptions
 from pipeline.methods.global_planner.optimum import confirmed
-from pipeline.methods.global_planner.smooth import ATTEMPTS, ENOUGH, TRACKING, Searches, grids, nothing, room
+from pipeline.methods.global_planner.smooth import ATTEMPTS, ENOUGH, Searches, grids, nothing, promised, room
 from pipeline.methods.method import Context
 from pipeline.path.reference import Reference
 from pipeline.path.timing import Found
@@ -112,7 +112,7 @@ def timed(problem: Problem, found: list[Solution], options: GlobalOptions, conte
             Trajectory(best.curve.times, best.curve.q, best.curve.ends),
             Status.SOLVED,
             message,
-            tracking_tolerance=reference.tolerance if problem.zero_acceleration else TRACKING,
+            tracking_tolerance=promised(problem),
             limits_kept=LIMIT_KINDS,
             evidence=f"the best of {len(good)} that were found from {len(answers)} optima; {confirmed(best.solves)}",
             reference=reference,

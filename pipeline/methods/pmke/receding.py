@@ -105,7 +105,9 @@ def _first_plan(problem: Problem, objective: Objective) -> tuple[Callable[[Array
     times = np.linspace(0.0, problem.reference.duration, PLAN_INTERVALS + 1)
     whole = replace(problem, times=times, objective=objective, boundary=Boundary.FIXED)
     for starts in FIRST_STARTS:
-        first = global_planner(whole, GlobalOptions(optimised=starts, budget=starts, refine_to=None))[0]
+        first = global_planner(
+            whole, GlobalOptions(transcription="differences", optimised=starts, budget=starts, refine_to=None)
+        )[0]
         if first.found:
             return _through(times, first.trajectory.q), ""
     return None, first.message

@@ -33,6 +33,7 @@ def why_not(problem: Problem) -> str | None:
         "a secondary criterion": objective.secondary is not None,
         "neither velocities nor torques in the objective": not any(map(objective.weight, SERVED)),
         "rest, or limits of accelerations or jerks": any(problem.rest) or problem.bounds.smooth,
+        "a path that need not be kept exactly": not problem.reference.exact,
         "bounds on integrals": bool(problem.bounds_of_integrals),
         "clearances and torques at once": problem.keeps_clear and _torques(problem),
         "so few intervals": len(problem.times) <= FEWEST[_torques(problem)],

@@ -41,6 +41,7 @@ def follow(program: Spline) -> None:
     if program.law is None:
         tracking.follow(program)
         return
+    tracking.loosen(program)
     end = program.intervals + (0 if program.closed and base.comes_back(program) else 1)
     for knots in blocks(program.first_free, end):
         _at(program, program.law, np.setdiff1d(knots, program.left_out))
@@ -62,4 +63,4 @@ def _at(program: Spline, law: Law, knots: Block) -> None:
     pattern = [(k * m + i, k * n + j) for k in range(count) for i in range(m) for j in range(n)]
     pattern += [(k * m + i, size + k) for k in range(count) for i in range(m)]
     unknowns = np.concatenate([program.y[knots].ravel(), law.s[knots].ravel()])
-    program.add_rows(position, np.zeros(count * m), unknowns, pattern)
+    tracking.hold(program, knots, position, unknowns, pattern)

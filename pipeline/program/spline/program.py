@@ -26,18 +26,23 @@ SMALL_WITH_TORQUE = 3e-3
 
 @dataclass(frozen=True)
 class Tightened:
-    """What of the limits holds at the knots so that they hold between them: torque, power (N + 1, n) are factors, and
-    keep_off [m] is by how much more than the margin obstacles are kept off.
+    """What of the limits holds at the knots so that they hold between them: factors of torque, power (N + 1, n), of the
+    tolerances of the path and the pace of the tool (N + 1, 1); keep_off [m] is by how much more than the margin
+    obstacles are kept off.
     """
 
     torque: Array
     power: Array
+    tolerance: Array
+    orientation_tolerance: Array
+    tool_speed: Array
+    tool_acceleration: Array
     keep_off: float = 0.0
 
     @classmethod
     def none(cls, problem: Problem, times: Array) -> Tightened:
-        whole = np.ones((len(times), problem.task.arm.n))
-        return cls(whole, whole)
+        whole, one = np.ones((len(times), problem.task.arm.n)), np.ones((len(times), 1))
+        return cls(whole, whole, one, one, one, one)
 
 
 @dataclass(frozen=True)
@@ -84,6 +89,7 @@ class Spline(Lifted):
     def __init__(self, problem: Problem, guess: Curve, tightened: Tightened, *, stretch: float | None = None) -> None:
         super().__init__(problem, guess.times, guess.q, keep_off=tightened.keep_off)
         self.guess, self.tightened = guess, tightened
+        self.tube = np.hstack([tightened.tolerance, tightened.orientation_tolerance])
         place, velocity, self.weights = stations(problem, guess)
         costs = integrals(problem, guess if stretch is None else guess.stretched(stretch))
         sums = Sums(place, self.weights, costs.tau, trapezoid_weights(guess.times))
@@ -102,7 +108,7 @@ class Spline(Lifted):
         self.law = self._law(small) if problem.free_law else None
         # r, r^2, r^3
         self.stretch = None if stretch is None else self.new("stretch", stretch ** np.array([1.0, 2.0, 3.0]))
-        if problem.zero_acceleration:
+        if problem.zero_acceleration and problem.reference.exact:
             # Ends at rest without acceleration give the path's rows there all that they can be given.
             self.left_out = tuple(
                 knot for knot, rests in zip((1, self.intervals - 1), problem.rest, strict=True) if rests

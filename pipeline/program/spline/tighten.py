@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d
 
 from pipeline.common.arrays import Array
 from pipeline.model.clearance import Clearance
@@ -20,7 +22,14 @@ BETWEEN = 10  # points per interval
 ROUNDS = 8
 
 
+FORCES = ("torque", "power")
+OF_TOOL = ("tolerance", "orientation_tolerance", "tool_speed", "tool_acceleration")
+
+
 MARGIN = 1e-4  # relative, on what is tightened
+
+
+NEAR = 10  # a tenth of the intervals on either side gives way with one in which the tool exceeds a limit
 
 
 KEPT = 1e-7  # relative: excess that is none
@@ -51,7 +60,35 @@ def excesses(problem: Problem, curve: Curve) -> dict[str, Array]:
     jerk = np.repeat(np.diff(curve.a, axis=0) / np.diff(curve.times)[:, None], BETWEEN, axis=0)
     found |= {"velocity": np.abs(v) / bounds.velocity - 1, "acceleration": np.abs(a) / bounds.acceleration - 1}
     found["jerk"] = np.abs(np.vstack([jerk[:1], jerk])) / bounds.jerk - 1
+    found |= _off_path(problem, moments, q) | _pace(problem, q, v, a)
     return {kind: excess for kind, excess in found.items() if excess.max() > -1.0}
+
+
+def _off_path(problem: Problem, moments: Array, q: Array) -> dict[str, Any]:
+    """By how much a path's tolerances are exceeded where it need not be kept exactly, each (K, 1)."""
+    reference = problem.reference
+    if reference.exact:
+        return {}
+    error, count = problem.task.error(q, reference.position(moments)), len(problem.task.axes)
+    kinds = {"tolerance": error[:, :count], "orientation_tolerance": error[:, count:]}
+    return {
+        kind: np.linalg.norm(part, axis=1, keepdims=True) / allowed - 1
+        for (kind, part), allowed in zip(kinds.items(), reference.tolerances, strict=True)
+        if part.size
+    }
+
+
+def _pace(problem: Problem, q: Array, v: Array, a: Array) -> dict[str, Any]:
+    """The same of the tool's speed and acceleration."""
+    bounds, task = problem.bounds, problem.task
+    if not bounds.limits_tool:
+        return {}
+    jacobian, rows = task.arm.jacobian(q)[:, task.rows], task.arm.jacobian_rate_term(q, v)[:, task.rows]
+    speed, acceleration = np.einsum("kij,kj->ki", jacobian, v), np.einsum("kij,kj->ki", jacobian, a) + rows
+    return {
+        "tool_speed": np.linalg.norm(speed, axis=1, keepdims=True) / bounds.tool_speed - 1,
+        "tool_acceleration": np.linalg.norm(acceleration, axis=1, keepdims=True) / bounds.tool_acceleration - 1,
+    }
 
 
 def worst(problem: Problem, curve: Curve) -> Violation | None:
@@ -62,14 +99,17 @@ def worst(problem: Problem, curve: Curve) -> Violation | None:
     kind = max(found, key=lambda name: float(found[name].max()))
     sample, joint = np.unravel_index(int(found[kind].argmax()), found[kind].shape)
     moments, relative = sampled(curve.times), float(found[kind][sample, joint])
-    bounds = problem.bounds
+    bounds, name = problem.bounds, problem.task.arm.description.joints[joint]
     if kind == "position":
         reached = float(curve(moments[sample : sample + 1])[0, joint])
         limit = float(bounds.upper[joint] if reached > bounds.lower[joint] else bounds.lower[joint])
+    elif kind in OF_TOOL:
+        own = problem.reference if kind.endswith("tolerance") else bounds
+        limit, name = float(getattr(own, kind)), "the end effector"
+        reached = limit * (1 + relative)
     else:
         limit = float(np.broadcast_to(getattr(bounds, kind), problem.task.arm.n)[joint])
         reached = limit * (1 + relative)
-    name = problem.task.arm.description.joints[joint]
     return Violation(kind, name, limit, reached, float(moments[sample]), relative)
 
 
@@ -94,7 +134,8 @@ def tighten(problem: Problem, first: Solved, **options: object) -> tuple[Solved,
     """
     solved, further, tightened = first, [], Tightened.none(problem, first.curve.times)
     for count in range(ROUNDS):
-        stricter = _stricter(problem, solved.curve.stretched(solved.stretch), tightened, 1.0 + count)
+        posed, curve = solved.timed(problem).slowed(solved.stretch), solved.curve.stretched(solved.stretch)
+        stricter = _stricter(posed, curve, tightened, 1.0 + count)
         if stricter is None or not solved.outcome.converged:
             break
         tightened = stricter
@@ -108,12 +149,14 @@ def _stricter(problem: Problem, curve: Curve, tightened: Tightened, gain: float)
     """Limits at the knots that leave out what this spline exceeds between them; None if it does not."""
     found = excesses(problem, curve)
     factors = {}
-    for kind in ("torque", "power"):
+    for kind in FORCES + OF_TOOL:
         factors[kind] = own = getattr(tightened, kind).copy()
         if kind in found:
             beyond = np.maximum(found[kind], 0.0)
             inner = np.lib.stride_tricks.sliding_window_view(beyond, BETWEEN + 1, axis=0)[::BETWEEN].max(axis=-1)
             inner = np.where(inner > KEPT, gain * inner + MARGIN, 0.0)
+            if kind in OF_TOOL:  # else the excess moves on to where the limit is not tightened
+                inner = maximum_filter1d(inner, 2 * (len(inner) // NEAR) + 1, axis=0)
             own[:-1] = np.minimum(own[:-1], getattr(tightened, kind)[:-1] / (1 + inner))
             own[1:] = np.minimum(own[1:], getattr(tightened, kind)[1:] / (1 + inner))
     lacking = 0.0
@@ -121,8 +164,8 @@ def _stricter(problem: Problem, curve: Curve, tightened: Tightened, gain: float)
         clearance = Clearance(problem.task.arm, problem.obstacles, problem.own)
         closest = [close for one in curve(sampled(curve.times)) for close in clearance.closest(one)]
         lacking = max(0.0, *(close.margin - close.distance for close in closest))
-    exceeded = any(float(found[kind].max()) > KEPT for kind in ("torque", "power") if kind in found)
+    exceeded = any(float(found[kind].max()) > KEPT for kind in FORCES + OF_TOOL if kind in found)
     if not exceeded and not lacking:
         return None
     more = (0.2 + gain) * lacking + 1e-7 if lacking else 0.0
-    return Tightened(factors["torque"], factors["power"], tightened.keep_off + more)
+    return Tightened(**factors, keep_off=tightened.keep_off + more)

@@ -22,7 +22,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from pipeline.problem.problem import Problem
-from pipeline.program.spline import law, rows, torque
+from pipeline.program.spline import law, rows, tool, torque
 from pipeline.program.spline.curve import Curve
 from pipeline.program.spline.program import Spline, Tightened
 from pipeline.program.terms import clearance, ends, energy
@@ -39,6 +39,7 @@ COMMON: tuple[Term, ...] = (
     torque.lift,
     rows.limits,
     torque.limits,
+    tool.limits,
     clearance.keep,
 )
 

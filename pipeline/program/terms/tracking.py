@@ -1,20 +1,73 @@
-"""The end effector is on its path at every knot."""
+"""The end effector is on its path at every knot, or within a tolerance of its point there."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
+from pydrake.solvers import QuadraticConstraint
 
 from pipeline.common.arrays import Array
 from pipeline.program.program import POSITIONS_PER_BINDING, Block, Lifted, blocks
 from pipeline.program.scaling import POSITION_SCALE
 from pipeline.program.terms import base
 
+OFF_SCALE = 0.01  # of a departure by the whole tolerance: small, like the positions
+INSIDE = 1e-6  # relative: by how much less than the tolerance, so that rounding does not exceed it
+
+Errors = Callable[[Array], tuple[Array, Array]]
+
 
 def follow(program: Lifted) -> None:
     """x(q_i) = x_ref,i, and for poses R(q_i) = R_ref,i; not at a start that is given, nor where closed joints do it."""
+    loosen(program)
     end = program.intervals + (0 if program.closed and base.comes_back(program) else 1)
     for knots in blocks(program.first_free, end, POSITIONS_PER_BINDING):
         _at(program, np.setdiff1d(knots, program.left_out))
+
+
+def loosen(program: Lifted) -> None:
+    """The departures from a path that need not be kept exactly are unknowns e_i (N + 1, m), in units of its tolerances:
+
+    |e_i| <= 1, its position's m coordinates and its orientation's each in a ball of their own.
+    """
+    if program.problem.reference.exact:
+        return
+    error, units = program.task.error(program.guess.q, program.x_ref), _units(program)
+    off = program.new("off", OFF_SCALE * error / units)
+    convex = QuadraticConstraint.HessianType.kPositiveSemidefinite
+    count = len(program.task.axes)
+    for part, width in zip((slice(0, count), slice(count, None)), program.tube.T, strict=True):
+        size = off[0, part].size
+        for own, share in zip(off[program.first_free :, part], width[program.first_free :], strict=True):
+            if size:
+                form = np.eye(size) * 2 / (OFF_SCALE * share * (1 - INSIDE)) ** 2
+                ball = QuadraticConstraint(form, np.zeros(size), -np.inf, 1.0, convex)
+                program.drake.AddConstraint(ball, own)
+
+
+def hold(program: Lifted, knots: Block, errors: Errors, unknowns: Any, pattern: list[tuple[int, int]]) -> None:
+    """errors(x), all m of every one of the knots, with their Jacobian, are zero, or the departures allowed there."""
+    m, count, zero = program.task.m, len(knots), np.zeros(len(knots) * program.task.m)
+    if program.problem.reference.exact:
+        program.add_rows(errors, zero, unknowns, pattern)
+        return
+    split, units = len(unknowns), np.tile(_units(program) / OFF_SCALE, count)
+    own = np.diag(-units)
+
+    def less(x: Array) -> tuple[Array, Array]:
+        value, jacobian = errors(x[:split])
+        return value - units * x[split:], np.hstack([jacobian, own])
+
+    everything = np.concatenate([unknowns, program["off"][knots].ravel()])
+    program.add_rows(less, zero, everything, [*pattern, *((i, split + i) for i in range(count * m))])
+
+
+def _units(program: Lifted) -> Array:
+    """The tolerance of each of the m errors [m or rad]."""
+    count = len(program.task.axes)
+    return np.repeat(program.problem.reference.tolerances, (count, program.task.m - count))
 
 
 def _at(program: Lifted, knots: Block) -> None:
@@ -28,4 +81,4 @@ def _at(program: Lifted, knots: Block) -> None:
         return value.ravel(), rows.reshape(count * m, count * n)
 
     pattern = [(k * m + i, k * n + j) for k in range(count) for i in range(m) for j in range(n)]
-    program.add_rows(position, np.zeros(count * m), program.y[knots].ravel(), pattern)
+    hold(program, knots, position, program.y[knots].ravel(), pattern)

@@ -36,7 +36,7 @@ def predictions(monkeypatch: pytest.MonkeyPatch) -> Seen:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("interpolation", ["quintic", "cubic"])
+@pytest.mark.parametrize("interpolation", ["quartic", "quintic", "cubic"])
 @pytest.mark.parametrize("horizon", [1, 2, 5])
 def test_predictions_are_on_the_path_and_join_the_motion(
     problem: Make, predictions: Seen, horizon: int, interpolation: str
@@ -58,7 +58,8 @@ def test_predictions_are_on_the_path_and_join_the_motion(
         np.testing.assert_allclose(spline(times), points, atol=1e-9)
         np.testing.assert_allclose(spline(times[0], 1), qd, atol=1e-9)
         np.testing.assert_allclose(spline(times[-1], 1), 0.0, atol=1e-9)
-        if interpolation == "quintic":
+        assert spline.k == {"quartic": 4, "quintic": 5, "cubic": 3}[interpolation]
+        if interpolation != "cubic":
             np.testing.assert_allclose(spline(times[0], 2), qdd, atol=1e-8)
             np.testing.assert_allclose(spline(times[-1], 2), 0.0, atol=1e-8)
     # Looking ahead pays: this motion costs LSV half as much again.

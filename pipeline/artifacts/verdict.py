@@ -1,0 +1,148 @@
+"""The verdict on a run: which motion to send and why it can be trusted, or why there is none."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.artifacts.bands import bands, closest
+from pipeline.artifacts.report import Report
+from pipeline.evaluation.evaluation import Evaluation
+from pipeline.methods.registry import METHODS
+from pipeline.problem.problem import Problem
+from pipeline.problem.solution import Status
+from pipeline.studies.estimate import Estimate
+from pipeline.studies.export import TOLERANCE, Nothing, Resampled
+
+BASELINES = ("lsv", "inertia_weighted")
+COSTS = {"kinetic_energy": "energy", "torque": "squared torque"}  # what is saved, by the integral
+
+
+def sent(report: Report) -> Evaluation | None:
+    """The motion that is exported."""
+    exported = report.find(Resampled)
+    return next((e for e in report.motions.evaluations if exported and called(e) == called(exported)), None)
+
+
+def first(report: Report) -> Evaluation | None:
+    """The motion to look at first: that to send, else the cheapest within its limits; None if no method found any."""
+    solved = sorted(report.motions.solved, key=lambda e: (bool(exceeded(e)), e.objective))
+    found = [e for e in report.motions.evaluations if e.solution.found]
+    return sent(report) or next(iter([*solved, *found]), None)
+
+
+def verdict(report: Report) -> str:
+    """One paragraph."""
+    motion, exported, refused = first(report), report.find(Resampled), report.find(Nothing)
+    if motion is None or motion.status is not Status.SOLVED:
+        return f"Nothing to send: {'; '.join(f'{called(e)} is {status(e)}' for e in report.motions.evaluations)}."
+    reasons = f"{_reasons(report, motion)}."
+    if exported is not None and exported.faults:
+        return f"Not to be sent, though exported: {called(motion)} {exported.fault}. {_capital(reasons)}"
+    if exported is not None:
+        return f"Send {called(motion)}: {reasons}"
+    if refused is not None and refused.refused:
+        fault = next(one.fault for one in refused.refused if called(one) == called(motion))
+        return f"Nothing to send: {called(motion)}, the best found, {fault}. {refused.instead}{_capital(reasons)}"
+    return f"Best found: {called(motion)}: {reasons}"
+
+
+def called(e: Evaluation | Resampled) -> str:
+    """`global 1`, the first optimum with its number too."""
+    return f"{e.method} {e.optimum if isinstance(e, Resampled) else e.solution.optimum}"
+
+
+def status(e: Evaluation) -> str:
+    """How a motion ended; `solved` alone is not said of one that a robot could not make."""
+    if e.status is not Status.SOLVED:
+        return e.status.word
+    beyond = exceeded(e)
+    return f"{e.status.word}, exceeds {', '.join(beyond)}" if beyond else e.status.word
+
+
+def exceeded(e: Evaluation) -> list[str]:
+    """The kinds of limits that a motion exceeds, at its knots or between them."""
+    kinds = dict.fromkeys([*e.limit_excess, *e.limit_excess_between])
+    return [
+        kind for kind in kinds if max(e.limit_excess.get(kind, 0.0), e.limit_excess_between.get(kind, 0.0)) > TOLERANCE
+    ]
+
+
+def baseline(report: Report) -> Evaluation | None:
+    """The pseudoinverse's motion that the others are held against, if one is confirmed from end to end."""
+    return next((found for name in BASELINES if (found := report.motions.best(name)) is not None), None)
+
+
+def saving(problem: Problem, e: Evaluation, against: Evaluation) -> float:
+    """By how much `e` costs less than another motion, relative; of the integral that weighs in the objective."""
+    own, other = (motion.integral(weighs(problem)) for motion in (e, against))
+    return 1 - own / other if other > 0 else 0.0
+
+
+def weighs(problem: Problem) -> str:
+    """The integral that is minimised, or the kinetic energy where several or other things are."""
+    names = [name for name, weight in problem.objective.weights.items() if weight]
+    return names[0] if len(names) == 1 else "kinetic_energy"
+
+
+def _reasons(report: Report, e: Evaluation) -> str:
+    problem = report.motions.problem
+    parts = [part for part in (_against(report, e), _limits(problem, e)) if part]
+    if problem.obstacles is not None:
+        parts.append(f"clearance {1000 * min(e.clearance.min(), e.clearance_between):.3g} mm")
+    band = next(band for band in bands(problem) if band.kind == "acceleration")
+    worst = int(np.nanmax(np.abs(e.qdd), axis=0).argmax())
+    parts.append(f"peak acceleration {np.nanmax(np.abs(e.qdd[:, worst])):.3g} {band.units[worst]}")
+    parts.append(f"path error {e.tracking_error_between:.1g} m")
+    if e.orientation_error_between > 0:
+        parts[-1] += f" and {e.orientation_error_between:.1g} rad"
+    own = e.near.own
+    if np.isfinite(own.bound):
+        parts.append(f"clear of itself by {1000 * own.bound:.3g} mm ({own.first} and {own.second})")
+    unchecked = [] if problem.own is not None and not problem.own.unknown else ["self-collision"]
+    if problem.obstacles is None:
+        unchecked.append("obstacles (none given)")
+    if not problem.bounds.any:
+        unchecked.append("limits (none given)")
+    known = _confirmed(report, e)
+    left = f"not checked: {', '.join(unchecked)}" if unchecked else ""
+    return "; ".join(filter(None, [", ".join(parts), known, left]))
+
+
+def _against(report: Report, e: Evaluation) -> str:
+    other, problem = baseline(report), report.motions.problem
+    if other is None:
+        singular = next((m for m in report.motions.evaluations if m.solution.event_time is not None), None)
+        return (
+            ""
+            if singular is None
+            else f"{METHODS[singular.method].title} is singular at {singular.solution.event_time:.2f} s"
+        )
+    if other is e:
+        return ""
+    saved, what = saving(problem, e, other), COSTS.get(weighs(problem), f"of the {weighs(problem)} integral")
+    share = f"{100 * abs(saved):.2g} % {'less' if saved >= 0 else 'more'} {what} than {METHODS[other.method].title}"
+    beyond = exceeded(other)
+    return share + (f" (which exceeds {', '.join(beyond)})" if beyond else "")
+
+
+def _limits(problem: Problem, e: Evaluation) -> str:
+    near, beyond = closest(problem, e), ", ".join(exceeded(e))
+    kept = f"exceeds {beyond}" if beyond else "keeps every limit" if problem.bounds.any else ""
+    return f"{kept} (closest: {near.said})" if near is not None else kept
+
+
+def _confirmed(report: Report, e: Evaluation) -> str:
+    """By whom: IPOPT, and searches of other kinds beside it."""
+    said = ["confirmed by IPOPT"] if "confirmed by IPOPT" in e.solution.evidence else []
+    estimate = report.find(Estimate)
+    for one in estimate.comparisons if estimate is not None and e.method == "global" else ():
+        other = report.motions.best(one.method)
+        if other is not None:
+            said.append(
+                f"{METHODS[one.method].title.lower()} within {100 * abs(other.objective / e.objective - 1):.2g} %"
+            )
+    return ", ".join(said)
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
