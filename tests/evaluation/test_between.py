@@ -52,7 +52,10 @@ def problem(task: PositionTask, **bounds: float | Array) -> Problem:
     return Problem(task, reference, np.zeros(n), TIME, limits=Limits(**filled))  # type: ignore[arg-type]
 
 
-def judged(stated: Problem, q: Array, ends: Array | None = None, clear: Near = Near()) -> Between:
+FREE = Near()
+
+
+def judged(stated: Problem, q: Array, ends: Array | None = None, clear: Near = FREE) -> Between:
     plant = SinglePlant(stated.task.arm)
     return between_knots(stated, plant, clear, Trajectory(TIME, q, ends=ends), np.zeros(q.shape[1]))
 
