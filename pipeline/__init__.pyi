@@ -11,6 +11,8 @@ from .methods.lsv import inertia_weighted as inertia_weighted
 from .methods.lsv import lsv as lsv
 from .methods.method import Context as Context
 from .methods.pareto import pareto as pareto
+from .methods.pmke.controller import Command as Command
+from .methods.pmke.controller import Controller as Controller
 from .methods.pmke.predictive import pmke as pmke
 from .methods.pmke.receding import receding as receding
 from .methods.pontryagin.as_printed import pontryagin_as_printed as pontryagin_as_printed

@@ -88,22 +88,6 @@ def _first_order(problem: Problem, e: Evaluation) -> dict[str, Any]:
     }
 
 
-def _updates(e: Evaluation) -> dict[str, Any]:
-    """How long the updates of a predictive method took, and the share that took longer than its update interval."""
-    log = e.solution.statistics.get("predictions")
-    if not log:
-        return {}
-    took = np.array([entry["wall_time_s"] for entry in log])
-    deadline = e.solution.statistics["update_interval"]
-    return {
-        "updates": len(took),
-        "update_median_s": float(np.median(took)),
-        "update_95_percent_s": float(np.percentile(took, 95)),
-        "update_max_s": float(took.max()),
-        "late_updates": float((took > deadline).mean()),
-    }
-
-
 def _orientation(problem: Problem, e: Evaluation) -> dict[str, Any]:
     if isinstance(problem.task, PositionTask):
         return {}
@@ -172,7 +156,6 @@ def _row(problem: Problem, e: Evaluation) -> dict[str, Any]:
         "min_singular_value": e.singular_value[:usable].min(),
         "min_spectral_radius": e.spectral_radius[radius],
         "min_spectral_radius_time": e.time[radius],
-        **_updates(e),
         "starts_in_basin": e.solution.statistics.get("starts_in_basin", np.nan),
         "grid_error": e.solution.statistics.get("grid_error", np.nan),
         "kind": e.solution.statistics.get("kind", ""),

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal, get_args
 
 from pydantic import Field
 
-from pipeline.config.fields import Number, Whole, WordOrWords, Words, schema
+from pipeline.config.fields import Number, Switch, Whole, WordOrWords, Words, schema
 from pipeline.config.goal import Integral, Positive
 
 MethodName = Literal[
@@ -46,6 +46,13 @@ Prediction = Annotated[
     Literal["problem", "kinetic_energy", "torque"],
     Field(description="of a prediction; problem: the problem's, kinetic energy in place of torques"),
 ]
+Confirm = Annotated[
+    Literal["every", "last", "none"],
+    Field(
+        description="of the windows that Newton's method solved, those that ipopt solves again from its answer: every "
+        "one; last: a sample of ten, after the motion; none"
+    ),
+]
 Drift = Annotated[Positive, Field(description="[m] tracking error above which the motion is not confirmed")]
 Apart = Annotated[Number, Field(gt=0, le=3.14)]  # [rad]: no two joint angles are farther apart, but for full turns
 
@@ -75,6 +82,10 @@ class PmkeOptions:
         Field(description="through the predicted knots; quartic: the paper's, with a knot inside each interval"),
     ] = "quartic"
     gain: Gain = 0.0
+    project: Annotated[
+        Switch, Field(description="whether every step is put back onto the path, which leaves no drift; without gain")
+    ] = False
+    confirm: Confirm = "every"
     tolerance: Annotated[Positive, Field(description="of a prediction, relative to its energy")] = 1e-8
     singular_value: Singular = 0.03
     max_drift: Drift = 0.01
@@ -92,7 +103,15 @@ class RecedingOptions:
         Whole,
         Field(ge=0, le=1000, description="coarse knots from the horizon to the end of the path, against dead ends"),
     ] = 8
-    tolerance: Annotated[Positive, Field(description="of a prediction, relative to its objective")] = 1e-8
+    real_time_iterations: Annotated[
+        Annotated[Whole, Field(ge=1, le=1000)] | None,
+        Field(description="quadratic programs of every update; null: as many as it takes"),
+    ] = None
+    confirm: Annotated[
+        Literal["every", "last", "none"],
+        Field(description="which windows ipopt checks, after the motion: every one; last: a sample of ten; none"),
+    ] = "last"
+    tolerance: Annotated[Positive, Field(description="of the predictions by ipopt, relative to their objective")] = 1e-8
 
 
 @schema

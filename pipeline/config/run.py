@@ -19,6 +19,7 @@ from pipeline.config.steps import refuse_endless, refuse_endless_search
 from pipeline.config.studies import (
     CandidateStudyConfig,
     ClosedLoopConfig,
+    ControlConfig,
     ExportConfig,
     IdentificationConfig,
     RetimingConfig,
@@ -90,6 +91,7 @@ class RunConfig:
     export: ExportConfig = ExportConfig()
     retiming: RetimingConfig = RetimingConfig()
     closed_loop: ClosedLoopConfig = ClosedLoopConfig()
+    control: ControlConfig = ControlConfig()
     identification: IdentificationConfig = IdentificationConfig()
 
 

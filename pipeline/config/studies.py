@@ -65,3 +65,27 @@ class ClosedLoopConfig:
         Number, Field(gt=-1, description="relative: by how much the controller takes the arm for heavier than it is")
     ] = 0.0
     initial_error: Annotated[Number, Field(description="[rad] of every joint at the start")] = 0.0
+
+
+@schema
+class ControlConfig:
+    """PMKE's controller in the loop: Drake's Simulator is driven by it tick by tick, from the start of the path."""
+
+    run: Annotated[Switch, Field(description="whether it is simulated")] = False
+    rate: Annotated[Number, Field(gt=0, le=10_000, description="[Hz] of the ticks")] = 100.0
+    bandwidth: Annotated[Positive, Field(description="[rad/s] of the torque's feedback")] = 25.0
+    damping: Annotated[Positive, Field(description="ratio of the same")] = 1.0
+    mass_error: Annotated[
+        Number, Field(gt=-1, description="relative: by how much the controller takes the arm for heavier than it is")
+    ] = 0.05
+    latency: Annotated[Whole, Field(ge=0, le=100, description="ticks after which a torque takes effect")] = 1
+    push_time: Annotated[
+        Annotated[Number, Field(ge=0)] | None, Field(description="[s] when every joint is pushed; null: never")
+    ] = None
+    push_torque: Annotated[Number, Field(description="[N m] of the push")] = 0.0
+    push_duration: Annotated[Positive, Field(description="[s] of the push")] = 0.1
+    stall_time: Annotated[
+        Annotated[Number, Field(ge=0)] | None,
+        Field(description="[s] when the controller is not called, and the last torque stays; null: never"),
+    ] = None
+    stall_ticks: Annotated[Whole, Field(ge=1, le=1000, description="ticks for which it is not called")] = 5

@@ -59,12 +59,13 @@ def between_knots(
     jerk = np.repeat(6 * spline.c[0], BETWEEN + 1, axis=0)  # constant in every interval
     energy, secondary, spinning = np.zeros((3, len(moments)))
     tau, pace, nb, way = np.zeros_like(q), np.zeros((len(q), 2)), plant.nb, np.tile(plant.start, (len(moments), 1, 1))
+    known = smooth or problem.bounds.any
     for i in range(len(moments)):
         plant.at(q[i], qd[i])
         energy[i] = plant.kinetic_energy()
         if nb:
             way[i], spinning[i] = plant.base()[1], plant.spin_squared()
-        if problem.bounds.any or smooth:
+        if known:
             tau[i] = plant.torque(qdd[i])
         if problem.bounds.limits_tool:
             pace[i] = plant.pace(problem.task, qdd[i])

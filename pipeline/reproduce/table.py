@@ -12,6 +12,7 @@ from pipeline.reproduce.recompute import Runs, recompute
 from pipeline.reproduce.results import NotRunError, ResultError
 from pipeline.reproduce.verdict import NOT_RUN, TIMING, VERDICTS, verdict
 
+RATIO = "a ratio of numbers that stand here too, not counted again"
 COLUMNS = (
     "document",
     "place",
@@ -68,7 +69,7 @@ def compare(documents: Sequence[Document], runs: Runs) -> pd.DataFrame:
                     "verdict": word,
                     "derived": document.derived(row),
                     "with_printed_masses": masses.get((document.name, place.place, row.quantity), np.nan),
-                    "note": "; ".join(part for part in (_read_as(row), note) if part),
+                    "note": "; ".join(filter(None, (_read_as(row), RATIO * document.derived(row), note))),
                     "command": command(row),
                 }
             )

@@ -7,6 +7,7 @@ from pipeline.common.errors import ConfigError
 from pipeline.config.run import RunConfig
 from pipeline.methods.registry import METHODS
 from pipeline.problem.problem import Problem
+from pipeline.studies import control
 
 _kept: list[tuple[RunConfig, Problem]] = []  # at most one, of a run that is about to begin in this process
 
@@ -34,4 +35,6 @@ def state(config: RunConfig) -> Problem:
         if why:
             served = [m.name for m in METHODS.values() if not m.why_not(problem, config.method.of(m.name))]
             raise ConfigError(f"{why}; methods that serve this problem: {', '.join(served)}")
+    if config.control.run and (why := control.why_not(problem, config.method.pmke, config.control)):
+        raise ConfigError(why)
     return problem

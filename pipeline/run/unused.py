@@ -42,7 +42,7 @@ def _why(group: str, key: str, config: RunConfig) -> str:
     if group == "method" and rest:
         runs = {*config.methods, *({"global"} if "pareto" in config.methods or config.candidate_study.run else ())}
         return "" if first in runs else f"{first} does not run (methods = [{','.join(config.methods)}])"
-    if group in ("closed_loop", "candidate_study", "identification") and first != "run":
+    if group in ("closed_loop", "control", "candidate_study", "identification") and first != "run":
         return "" if getattr(config, group).run else f"{group}.run = false"
     gcode = isinstance(config.path, WaypointsConfig) and config.path.file.lower().endswith(SUFFIXES)
     feeds = ("from_file",) if gcode and config.timing.law == "from_file" else ()

@@ -119,9 +119,10 @@ class NotRun(Result):
 
 def study(motions: Motions) -> Result | None:
     """Where it is asked for."""
-    config, motion = motions.config.closed_loop, chosen(motions)
+    config = motions.config.closed_loop
     if not config.run:
         return None
+    motion = chosen(motions)
     return NotRun() if motion is None else simulate(motion.solution.posed(motions.problem), motion, config)
 
 
@@ -139,8 +140,9 @@ def simulate(problem: Problem, evaluation: Evaluation, options: ClosedLoopConfig
     reference = PiecewisePolynomial.CubicHermite(knots, spline(knots).T, spline(knots, 1).T)
 
     builder = DiagramBuilder()
-    plant, model = builder.AddSystem(_plant(arm)), _plant(arm)
-    known = _heavier(model, 1 + options.mass_error)
+    plant, model = builder.AddSystem(plant_of(arm)), plant_of(arm)
+    known = model.CreateDefaultContext()
+    scale_masses(model, known, 1 + options.mass_error)
     gains = np.full((2, n), [[options.bandwidth**2], [2 * options.damping * options.bandwidth]])
     controller = builder.AddSystem(InverseDynamicsController(model, gains[0], np.zeros(n), gains[1], True, known))
     states = builder.AddSystem(TrajectorySource(reference, output_derivative_order=1))
@@ -197,7 +199,7 @@ def simulate(problem: Problem, evaluation: Evaluation, options: ClosedLoopConfig
     )
 
 
-def _plant(arm: Arm) -> Any:
+def plant_of(arm: Arm) -> Any:
     """The arm with one motor per joint."""
     plant = MultibodyPlant(0.0)
     model, _ = assemble(plant, Parser(plant), arm.description, arm.mounting)
@@ -209,16 +211,14 @@ def _plant(arm: Arm) -> Any:
     return plant
 
 
-def _heavier(plant: Any, factor: float) -> Any:
-    """A context in which all masses and inertias are larger by `factor`."""
-    context = plant.CreateDefaultContext()
+def scale_masses(plant: Any, context: Any, factor: float) -> None:
+    """Make all masses and inertias larger by `factor`."""
     for index in range(1, plant.num_bodies()):  # 0 is the world
         body = plant.get_body(BodyIndex(index))
         inertia = body.default_spatial_inertia()
         if inertia.get_mass() > 0:
             scaled = SpatialInertia(inertia.get_mass() * factor, inertia.get_com(), inertia.get_unit_inertia())
             body.SetSpatialInertiaInBodyFrame(context, scaled)
-    return context
 
 
 def draw(loop: ClosedLoop, title: str) -> Figure:

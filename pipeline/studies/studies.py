@@ -5,7 +5,9 @@ from __future__ import annotations
 from pipeline.studies import (
     candidates,
     closed_loop,
+    control,
     convergence,
+    deadlines,
     estimate,
     export,
     front,
@@ -22,6 +24,8 @@ STUDIES: tuple[Study, ...] = (
     convergence.study,
     identification.study,
     retiming.study,
+    deadlines.study,
+    control.study,
     export.study,
     closed_loop.study,
     candidates.study,

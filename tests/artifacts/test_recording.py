@@ -36,6 +36,7 @@ from pipeline.problem.problem import Problem
 from pipeline.robot import urdf
 from pipeline.robot.shapes import Shape, capsule
 from pipeline.studies import style
+from tests.reports import three_motions
 from tests.support import ROOT
 from tests.tasks import HUNG, wait_until
 
@@ -336,3 +337,19 @@ def test_the_viewer_shows_everything(
     assert {view.name: view.reports for view in state.views if view.reports} == {}
     assert [entry.message for entry in viewer.get_logs() if entry.level == "ERROR"] == []
     assert picture.startswith(b"\x89PNG")
+
+
+def test_it_opens_on_the_motion_to_look_at_and_holds_the_clearance(tmp_path: Path) -> None:
+    report = three_motions()
+    recording.write(report, tmp_path)
+    file = tmp_path / "recording.rrd"
+    for e in report.motions.evaluations:
+        time, values = recording.read_series(file, f"/{blueprint.slug(e.label)}/clearance")
+        np.testing.assert_array_equal(values[:, 0], e.clearance)
+        np.testing.assert_allclose(time, e.time, atol=1e-9)
+    plain = {"labels": ["lsv", "global"], "points": np.zeros((1, 3)), "revolute": [True], "planar": False, "ranges": {}}
+    named = blueprint.build(**plain, among=True, first="global").root_container
+    joints = named.contents[-1]
+    assert (joints.name, joints.active_tab) == ("Joints", 1)
+    checks = named.contents[1].contents[-1]
+    assert checks.contents[0].name == "Clearance [m]"

@@ -122,11 +122,15 @@ def solid(values: dict[str, Any]) -> tuple[Any, Any]:
 
 
 def path(config: dict[str, Any], start: Values, t: Values) -> Values | None:
-    """(K, 3): where the end effector should be; None for other curves and laws than the documents'."""
+    """(K, 3): where the end effector should be; None for other curves and laws than the documents', and circles out of
+    the plane.
+    """
     curve, timing = config["path"], config["timing"]
     duration = timing["duration"]
     length = 2 * np.pi * curve["radius"] if curve["kind"] == "circle" else curve.get("length")
     if curve["kind"] not in ("line", "circle") or timing["law"] not in ("raised_cosine", "constant_speed"):
+        return None
+    if curve["kind"] == "circle" and np.ndim(curve["center_direction"]):
         return None
     s = law(t, length, duration)[0] if timing["law"] == "raised_cosine" else length * t / duration
     if curve["kind"] == "line":

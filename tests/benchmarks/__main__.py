@@ -24,7 +24,7 @@ from pipeline.problem.lagrangian import Lagrangian
 from pipeline.program.confirm import Confirm, Confirmation
 from pipeline.program.newton.newton import WARM
 from pipeline.program.newton.serve import Solver
-from tests.benchmarks import bound, peer, planner, scaling
+from tests.benchmarks import bound, peer, planner, scaling, updates
 
 REPEATS = 7
 
@@ -41,7 +41,7 @@ def report(name: str, ours: list[float], theirs: list[float], note: str) -> None
 
 
 def predictions(repeats: int = REPEATS) -> None:
-    """Every prediction of PMKE on trajectory 3, with the guesses of a real run."""
+    """Every window of PMKE that IPOPT solves on trajectory 3: as it comes from a real run."""
     problem = prepare(check({}))
     calls: list[tuple[Any, ...]] = []
     solve = Window.solve
@@ -115,6 +115,7 @@ def small() -> None:
 
 PARTS: dict[str, Callable[[list[str]], None]] = {
     "small": lambda _: small(),
+    "updates": updates.main,
     "planner": planner.main,
     "scaling": scaling.main,
     "bound": bound.main,
@@ -125,7 +126,7 @@ def main(words: list[str]) -> None:
     """Small programs, whole plans and how they scale; or one part, and of that only what is named behind it."""
     if words and words[0] not in PARTS:
         sys.exit(f"{words[0]}: not one of {', '.join(PARTS)}")
-    for part in words[:1] or ["small", "planner", "scaling"]:
+    for part in words[:1] or ["small", "updates", "planner", "scaling"]:
         PARTS[part](words[1:])
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from pipeline.build.problem import prepare
 from tests.benchmarks import __main__ as benchmarks
-from tests.benchmarks import peer, planner, scaling
+from tests.benchmarks import peer, planner, scaling, updates
 from tests.benchmarks.spatial import SpatialArm
 from tests.support import FEW_STARTS, composed
 
@@ -30,6 +30,15 @@ def test_small_programs(capsys: pytest.CaptureFixture[str]) -> None:
         assert all(number > 0 for number in line_of(name, out))
     assert float(re.findall(r"costs agree to (\S+)", out)[0]) < 1e-4
     assert all(float(gap) < 1e-4 for gap in re.findall(r"motions agree to (\S+) rad", out))
+
+
+@pytest.mark.slow
+def test_updates(capsys: pytest.CaptureFixture[str]) -> None:
+    updates.trajectory("traj4", 1, "method.pmke.dt=0.1", "method.pmke.update_interval=1")
+    out = capsys.readouterr().out
+    assert all(number > 0 for number in line_of("traj4", out))
+    assert float(re.findall(r"costs agree to (\S+),", out)[0]) < 1e-5
+    assert float(re.findall(r"integrals to (\S+) of", out)[0]) < 1e-3
 
 
 @pytest.mark.slow
@@ -75,7 +84,9 @@ def test_scaling(capsys: pytest.CaptureFixture[str]) -> None:
     assert re.search(r"^ +default +1 of +1 +1 of +1 ", out, re.M)
 
 
-@pytest.mark.parametrize("words", [["large"], ["planner", "sim9"], ["bound", "sim9"], ["scaling", "sim9"]])
+@pytest.mark.parametrize(
+    "words", [["large"], ["planner", "sim9"], ["updates", "traj9"], ["bound", "sim9"], ["scaling", "sim9"]]
+)
 def test_an_unknown_part_is_refused(words: list[str]) -> None:
     with pytest.raises(SystemExit, match="not one of"):
         benchmarks.main(words)

@@ -12,6 +12,8 @@ from pipeline.model.arm import Arm
 from pipeline.model.kernel.arm import BLOCK, KernelArm
 from pipeline.model.kernel.chain import Chain
 from pipeline.model.kernel.energy import energy, mass_matrix
+from pipeline.model.kernel.few import Few
+from pipeline.model.kernel.few_rows import FewRows
 from pipeline.model.kernel.rows import TaskRows
 from pipeline.model.kernel.torque import inverse_dynamics
 from pipeline.model.task import PoseTask, PositionTask, Task
@@ -128,6 +130,25 @@ def test_second_derivatives_are_differences_of_the_first(arm: Arm, rng: np.rando
     assert not cheap.mass.size
 
 
+def test_the_kernel_for_a_few_knots_is_the_same(arm: Arm, rng: np.random.Generator) -> None:
+    """Values beside Drake's, second derivatives beside the other kernel's, twice in the same arrays."""
+    few, chain = Few(Chain.of(arm), 3), Chain.of(arm)
+    for _ in range(2):
+        q, qd, _ = states(arm, 3, rng)
+        few.place(q)
+        position, rotation, jacobian = arm.pose_and_jacobian(q)
+        x, columns = few.tip_and_jacobian()
+        compare(x, position, 1e-12)
+        compare(few.tip_rotation(), rotation, 1e-12)
+        compare(columns.swapaxes(1, 2), jacobian[:, 3:], 1e-12)
+        compare(few.turning().swapaxes(1, 2), jacobian[:, :3], 1e-12)
+        compare(few.mass_matrix(), arm.mass_matrix(q), 1e-12)
+        own, other = few.energy(qd), energy(chain, q, qd)
+        compare((qd * own.by_qd).sum(axis=1) / 2, arm.kinetic_energy(q, qd), 1e-12)
+        for part in ("by_q", "by_qd", "mass", "mixed", "by_q_q"):
+            compare(getattr(own, part), getattr(other, part), 1e-12)
+
+
 def test_the_exact_derivatives_equal_drakes_autodiff(spatial: Arm, rng: np.random.Generator) -> None:
     """The sliding arm's own file, differentiated by Drake: no differences on either side."""
     chain, n = Chain.of(spatial), spatial.n
@@ -168,3 +189,10 @@ def test_rows_of_every_task(kind: str, rng: np.random.Generator) -> None:
         for k in range(len(q))
     ]
     compare(rows.curvature(found.columns, pull), np.array(right), 1e-7)
+    few = FewRows(Few(rows.chain, len(q)), task)
+    few.few.place(q)
+    own = few.evaluate(target)
+    compare(few.curvature(own, pull), np.array(right), 1e-7)
+    own = few.evaluate(away)
+    compare(own.error, error, 1e-12)
+    compare(own.jacobian, jacobian, 1e-11)

@@ -35,6 +35,7 @@ CHECKS = {
 
 
 FLOATING = {"base_turn": "Turn of the base [rad]"}  # first of the checks where the base floats
+AMONG = {"clearance": "Clearance [m]"}  # and where there are obstacles
 
 
 def slug(label: str) -> str:
@@ -50,11 +51,14 @@ def build(
     ranges: Mapping[str, tuple[float, float]],
     picture: str = "",
     floats: bool = False,
+    among: bool = False,
+    first: str = "",
 ) -> rrb.Blueprint:
     """The layout for the motions `labels`; the cameras take in `points` (P, 3) [m], all of the scene.
 
     revolute: (n,) which joints turn; it decides on the units in the titles.
     ranges: the lowest and highest value to show of an entity such as `kinetic_energy`; others show all there is.
+    among: whether there are obstacles. first: the label of the motion whose joints are shown first.
     picture: the title of one that is shown in the first tab, if any. With more than MANY motions the first and the last
     are shown, and the panel on the left is open, where the eye beside each motion shows or hides it.
     """
@@ -67,11 +71,12 @@ def build(
         summary = rrb.Tabs(rrb.Spatial2DView(origin="/picture", name=picture), summary)
     compared = {
         entity: _compare(labels, entity, title, ranges.get(entity))
-        for entity, title in (ENERGIES | CHECKS | FLOATING).items()
+        for entity, title in (ENERGIES | CHECKS | FLOATING | AMONG).items()
     }
-    checked = (FLOATING if floats else {}) | CHECKS
+    checked = (FLOATING if floats else {}) | (AMONG if among else {}) | CHECKS
     checks = rrb.Tabs(*[compared[entity] for entity in checked], name="Checks")
-    joints = rrb.Tabs(*[_joints(label, revolute) for label in labels], name="Joints")
+    opens = labels.index(first) if first in labels else 0
+    joints = rrb.Tabs(*[_joints(label, revolute) for label in labels], active_tab=opens, name="Joints")
     return rrb.Blueprint(
         rrb.Horizontal(
             rrb.Vertical(arms, summary, row_shares=[5, 3]),

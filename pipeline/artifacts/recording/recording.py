@@ -26,6 +26,7 @@ from pipeline.artifacts.recording.stream import record
 from pipeline.artifacts.report import Report
 from pipeline.artifacts.scene import box, corners, outlines, path_in_world
 from pipeline.artifacts.summary import text
+from pipeline.artifacts.verdict import first
 from pipeline.common.arrays import Array
 from pipeline.evaluation.evaluation import Evaluation
 from pipeline.model.arm import Arm
@@ -36,7 +37,7 @@ from pipeline.studies import style
 
 POSES = 12  # of the stroboscopic picture
 SOLID = 110  # opacity of the arms, of 255: those behind must shine through
-REFERENCE = (190, 190, 190)
+REFERENCE = (226, 170, 203)  # the colour that paths have in every picture, mixed with white
 OBSTACLE = (200, 70, 60, 255)
 
 
@@ -51,6 +52,7 @@ def write(report: Report, folder: Path) -> None:
         summary=text(report),
         properties={key: value for key, value in report.facts.items() if key != "inputs"},
         picture=None if cover is None else folder / "figures" / f"{cover}.png",
+        opens="" if (motion := first(report)) is None else motion.label,
     )
 
 
@@ -63,10 +65,12 @@ def save(
     summary: str,
     properties: Mapping[str, Any],
     picture: Path | None = None,
+    opens: str = "",
 ) -> None:
     """Write the recording `file` (.rrd) of all `evaluations`, or raise and leave nothing behind.
 
     summary: Markdown, shown beside the plots. properties: facts of the run, stored as the recording's property `run`.
+    opens: the label of the motion that is looked at first.
     picture: a PNG to show first, such as the Pareto front (2-D views have no axes of their own).
     """
 
@@ -85,7 +89,7 @@ def save(
             _send_series(recording, problem, evaluation)
             _send_motion(recording, problem, evaluation)
 
-    record(file, _layout(problem, evaluations, picture), fill)
+    record(file, _layout(problem, evaluations, picture, opens), fill)
 
 
 def read_series(file: Path, entity: str) -> tuple[Array, Array]:
@@ -102,7 +106,7 @@ def read_series(file: Path, entity: str) -> tuple[Array, Array]:
     return time[order], value[order]
 
 
-def _layout(problem: Problem, evaluations: Sequence[Evaluation], picture: Path | None) -> Any:
+def _layout(problem: Problem, evaluations: Sequence[Evaluation], picture: Path | None, opens: str) -> Any:
     points = [np.array([problem.task.arm.mounting.base_position]), path_in_world(problem)]
     if problem.obstacles is not None:
         points.append(np.array([shape.position for shape in problem.obstacles.shapes]))
@@ -115,7 +119,15 @@ def _layout(problem: Problem, evaluations: Sequence[Evaluation], picture: Path |
     revolute = problem.task.arm.description.turning.tolist()
     tab = "" if picture is None else picture.stem.replace("_", " ").capitalize()
     return blueprint.build(
-        labels, np.concatenate(points), revolute, _planar(problem), _ranges(evaluations), tab, floats
+        labels,
+        np.concatenate(points),
+        revolute,
+        _planar(problem),
+        _ranges(evaluations),
+        tab,
+        floats,
+        problem.obstacles is not None,
+        opens,
     )
 
 
@@ -184,6 +196,8 @@ def _send_series(recording: Any, problem: Problem, evaluation: Evaluation) -> No
         "singular_value": evaluation.singular_value,
         "spectral_radius": evaluation.spectral_radius,
     }
+    if problem.obstacles is not None:
+        scalars["clearance"] = evaluation.clearance
     if evaluation.base.reaction is None:
         scalars["base_turn"] = evaluation.base.turn
     for entity, values in vectors.items():

@@ -62,8 +62,9 @@ def solve(problem: Problem, options: GlobalOptions, context: Context) -> list[So
         if problem.reference.exact:
             return by_differences(problem, options, context)
         return loosened(problem, by_differences(exactly(problem), options, context), options, context)
-    found = by_differences((freer if problem.free_timing else rough)(problem), options, context)
-    if not found[0].found and problem.constrained and not problem.free_timing:
+    first = (freer if problem.free_timing else rough)(problem)
+    found = by_differences(first, options, context)
+    if not found[0].found and first.constrained and not problem.free_timing:
         found = max(found, by_differences(freer(problem), options, context), key=lambda motions: motions[0].found)
     if found[0].found:  # on the knots that the path needs
         problem = replace(problem, times=found[0].trajectory.time)

@@ -1,9 +1,12 @@
-"""PMKE with limits, for any first-order or torque objective: a receding horizon on the planner's own lifted program.
+"""PMKE with limits: a receding horizon whose knots are executed as they are.
 
 Every update interval the motion over the next h knots is optimised from the present position and velocity, within the
-position, velocity, torque and power limits and clear of the obstacles (`program/`); its first knots are
-executed as they are, so that the executed motion keeps the limits at its knots. A few coarse knots carry the window on
-to the end of the path: a horizon alone runs into dead ends, where the limits leave no way on.
+position, velocity, acceleration, torque and power limits and clear of the obstacles; its first knots are executed, so
+that the executed motion keeps the limits at its knots. A few coarse knots carry the window on to the end of the path: a
+horizon alone runs into dead ends, where the limits leave no way on.
+Windows are solved on their stages (`stages.py`) from the plan before and its multipliers; IPOPT solves them, on the
+planner's own lifted program, where the stages do not serve the objective, or where no plan is left, and checks a sample
+of them after the motion.
 Before anything moves the global planner makes a rough plan of the whole, from which the first window starts. If a later
 window has no solution, the rest of the last plan is followed; when that is used up too, the method gives up and says
 where.
@@ -14,7 +17,7 @@ from __future__ import annotations
 import time as clock
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
@@ -22,8 +25,10 @@ from scipy.interpolate import make_interp_spline
 from pipeline.common.arrays import Array
 from pipeline.config.methods import GlobalOptions, RecedingOptions
 from pipeline.methods.global_planner.planner import global_planner
-from pipeline.methods.method import ON_KNOTS, Context, Method
+from pipeline.methods.method import ANY, Context, Method
 from pipeline.methods.pmke.prediction import path_weight, rollout, solve_window, window_objective
+from pipeline.methods.pmke.predictor import SAMPLE
+from pipeline.methods.pmke.stages import Answer, Stages, why_not
 from pipeline.methods.singularity import singular_value_ratio
 from pipeline.model.kinematics import project
 from pipeline.problem.limits import LIMIT_KINDS
@@ -46,7 +51,24 @@ def solve(problem: Problem, options: RecedingOptions, context: Context) -> list[
     return [_follow(problem, options)]
 
 
-receding = Method("receding", "PMKE with limits", "#5B7FDB", RecedingOptions, ON_KNOTS, solve)
+def refuses(problem: Problem, options: RecedingOptions) -> str | None:
+    """Of limits between knots and of rest only accelerations are served, as differences, and by the stages alone."""
+    if any(problem.rest) or np.isfinite(problem.bounds.jerk).any():
+        return "the joints are to rest at an end, or their jerks are limited; method=global serves both"
+    if not np.isfinite(problem.bounds.acceleration).any():
+        return None
+    why = _stages_why_not(problem, options)
+    return why and f"limits of acceleration together with {why}; method=global serves both"
+
+
+receding = Method("receding", "PMKE with limits", "#5B7FDB", RecedingOptions, ANY, solve, refuses)
+
+
+def _stages_why_not(problem: Problem, options: RecedingOptions) -> str | None:
+    intervals = max(1, round(problem.reference.duration / options.prediction_step))
+    own = max(options.horizon, round(options.update_interval / options.prediction_step))
+    asked = replace(problem, objective=window_objective(problem, options.objective))
+    return why_not(asked, min(intervals, own + options.tail) * problem.task.arm.n)
 
 
 def _follow(problem: Problem, options: RecedingOptions) -> Solution:
@@ -55,30 +77,24 @@ def _follow(problem: Problem, options: RecedingOptions) -> Solution:
     times = np.linspace(0.0, duration, count + 1)
     every = max(1, round(options.update_interval / (duration / count)))
     objective = window_objective(problem, options.objective)
+    updates = _Updates(replace(problem, objective=objective, boundary=Boundary.FIXED), options)
     q = np.tile(problem.q_init, (count + 1, 1))
-    plan, why_not = _first_plan(problem, objective)
+    plan, why = _first_plan(problem, objective)
     if plan is None:
-        return _given_up(why_not, options, times, q[:1], [])
+        return _given_up(why, options, times, q[:1], [])
     planned = 0  # the last knot that there is a plan for
-    log: list[dict[str, Any]] = []
     for i in range(0, count, every):
         last = min(i + max(options.horizon, every), count)
-        ahead = _knots(times, i, last, options.tail)
-        window = replace(
-            problem,
-            q_init=q[i],
-            qd_init=None if i == 0 else (q[i] - q[i - 1]) / (times[i] - times[i - 1]),
-            times=ahead,
-            boundary=Boundary.FIXED,
-            objective=objective,
-        )
-        found, entry = _update(window, plan, options)
-        log.append(entry)
+        qd = None if i == 0 else (q[i] - q[i - 1]) / (times[i] - times[i - 1])
+        window = replace(updates.problem, q_init=q[i], qd_init=qd, times=_knots(times, i, last, options.tail))
+        found = updates(window, plan, alone=planned < min(i + every, count))
         if found is not None:
-            plan, planned = _through(ahead, found), last
+            plan, planned = _through(window.times, found), last
             q[i : last + 1] = found[: last + 1 - i]
         elif planned < min(i + every, count):
-            return _given_up(_why(window), options, times, q[: i + 1], log)
+            return _given_up(_why(window), options, times, q[: i + 1], updates.log)
+    updates.confirm()
+    log = updates.log
     failed = sum(not entry["converged"] for entry in log)
     message = f"{failed} of {len(log)} windows were not solved: the plan before was followed there" if failed else ""
     statistics = {
@@ -104,10 +120,11 @@ def _first_plan(problem: Problem, objective: Objective) -> tuple[Callable[[Array
     """The whole motion on a coarse grid, as the global planner finds it; or None, and why there is none."""
     times = np.linspace(0.0, problem.reference.duration, PLAN_INTERVALS + 1)
     whole = replace(problem, times=times, objective=objective, boundary=Boundary.FIXED)
+    # By differences as the windows are, unless accelerations are limited, of which those programs know nothing.
+    form: Literal["differences"] | None = None if problem.bounds.smooth else "differences"
     for starts in FIRST_STARTS:
-        first = global_planner(
-            whole, GlobalOptions(transcription="differences", optimised=starts, budget=starts, refine_to=None)
-        )[0]
+        options = GlobalOptions(transcription=form, optimised=starts, budget=starts, refine_to=None)
+        first = global_planner(whole, options)[0]
         if first.found:
             return _through(times, first.trajectory.q), ""
     return None, first.message
@@ -123,33 +140,83 @@ def _through(times: Array, q: Array) -> Callable[[Array], Array]:
     return make_interp_spline(times, q, k=min(3, len(times) - 1))
 
 
-def _update(
-    window: Problem, plan: Callable[[Array], Array], options: RecedingOptions
-) -> tuple[Array | None, dict[str, Any]]:
-    """One window: the motion found from the plan, or else from a roll-out, or None; and what is known of the update."""
-    begin = clock.perf_counter()
-    targets = window.reference.position(window.times[1:])
-    ahead = plan(window.times[1:])
-    moved, left = project(window.task, ahead, targets, path_weight(window.task.arm, ahead), tolerance=1e-9)
-    guesses = [moved] if np.all(left < 1e-3) else []
-    guesses.append(rollout(window, window.q_init, targets))
-    results = []
-    for guess in guesses:
-        results.append(solve_window(window, window.times, np.vstack([window.q_init, guess]), options.tolerance))
-        if results[-1][2].converged:
-            break  # the plan is followed on, not left for another optimum
-    best = min(results, key=lambda result: (not result[2].converged, result[1]))
-    entry = {
-        "time": float(window.times[0]),
-        "wall_time_s": clock.perf_counter() - begin,
-        "solver_time_s": sum(result[2].wall_time for result in results),
-        "solves": len(results),
-        "iterations": best[3],
-        "converged": best[2].converged,
-        "status": best[2].status,
-        "objective": best[1],
-    }
-    return (best[0] if best[2].converged else None), entry
+class _Updates:
+    """The windows of one motion, one after another. log: of each what run.json keeps."""
+
+    def __init__(self, problem: Problem, options: RecedingOptions) -> None:
+        self.problem, self.options = problem, options
+        self.stages = None if _stages_why_not(problem, options) else Stages(problem)
+        # Its program knows no accelerations: it would find another motion.
+        self.ipopt = not np.isfinite(problem.bounds.acceleration).any()
+        self.before: Answer | None = None  # of the last window, where it was solved
+        self.solved: list[tuple[int, Problem, Answer]] = []
+        self.log: list[dict[str, Any]] = []
+
+    def __call__(self, window: Problem, plan: Callable[[Array], Array], *, alone: bool) -> Array | None:
+        """The motion found from the plan (U + 1, n), or None. alone: no plan is left to follow instead."""
+        begin, processor = clock.perf_counter(), clock.process_time()
+        found, entry = self._on_stages(window, plan)
+        if self.ipopt and (self.stages is None or (found is None and alone)):
+            found, entry = self._by_ipopt(window, plan)
+        took, used = clock.perf_counter() - begin, clock.process_time() - processor
+        common = {"time": float(window.times[0]), "wall_time_s": took, "processor_time_s": used}
+        self.log.append({**common, "solver_time_s": took, **entry, "apart_from_ipopt": None})
+        return found
+
+    def confirm(self) -> None:
+        """IPOPT from the answers of the windows that its check is asked for: how far it moves them."""
+        which = {"every": len(self.solved), "last": SAMPLE, "none": 0}[self.options.confirm]
+        for i in _spread(len(self.solved), which if self.ipopt else 0):
+            place, window, answer = self.solved[i]
+            q, _, outcome, _ = solve_window(window, window.times, answer.q, self.options.tolerance)
+            if outcome.converged:
+                self.log[place]["apart_from_ipopt"] = float(np.abs(q - answer.q).max())
+
+    def _on_stages(self, window: Problem, plan: Callable[[Array], Array]) -> tuple[Array | None, dict[str, Any]]:
+        if self.stages is None:
+            return None, {}
+        guess = np.vstack([window.q_init, plan(window.times[1:])])
+        answer = self.stages.solve(window, guess, self.before, self.options.real_time_iterations)
+        self.before = answer if answer.converged else None
+        if answer.converged:
+            self.solved.append((len(self.log), window, answer))
+        entry = {
+            "solves": 1,
+            "iterations": answer.iterations,
+            "converged": answer.converged,
+            "status": answer.status,
+            "objective": answer.cost,
+        }
+        return (answer.q if answer.converged else None), entry
+
+    def _by_ipopt(self, window: Problem, plan: Callable[[Array], Array]) -> tuple[Array | None, dict[str, Any]]:
+        """From the plan or else from a roll-out."""
+        targets = window.reference.position(window.times[1:])
+        ahead = plan(window.times[1:])
+        moved, left = project(window.task, ahead, targets, path_weight(window.task.arm, ahead), tolerance=1e-9)
+        guesses = [moved] if np.all(left < 1e-3) else []
+        guesses.append(rollout(window, window.q_init, targets))
+        results = []
+        for guess in guesses:
+            start = np.vstack([window.q_init, guess])
+            results.append(solve_window(window, window.times, start, self.options.tolerance))
+            if results[-1][2].converged:
+                break  # the plan is followed on, not left for another optimum
+        best = min(results, key=lambda result: (not result[2].converged, result[1]))
+        entry = {
+            "solver_time_s": sum(result[2].wall_time for result in results),
+            "solves": len(results),
+            "iterations": best[3],
+            "converged": best[2].converged,
+            "status": best[2].status,
+            "objective": best[1],
+        }
+        return (best[0] if best[2].converged else None), entry
+
+
+def _spread(count: int, most: int) -> list[int]:
+    """At most so many of `count` places, evenly."""
+    return sorted({round(place) for place in np.linspace(0, count - 1, min(most, count))})
 
 
 def _given_up(message: str, options: RecedingOptions, times: Array, done: Array, log: list[dict[str, Any]]) -> Solution:

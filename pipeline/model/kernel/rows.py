@@ -69,10 +69,11 @@ class TaskRows:
         pull[:, self.axes] = multipliers[:, : len(self.axes)]
         product = _cross(pull[:, None], turning) @ moving.swapaxes(1, 2)
         if self.pose is not None:
-            product += self._angular(own[0], multipliers[:, len(self.axes) :])
+            product += self.angular(own[0], multipliers[:, len(self.axes) :])
         return self.chain.mirrored(product)
 
-    def _angular(self, own: Array, multipliers: Array) -> Array:
+    def angular(self, own: Array, multipliers: Array) -> Array:
+        """The angular rows' share (K, n, n), right on and above the diagonal: own (K, n, 3), multipliers (K, m - 3)."""
         assert self.pose is not None
         if self.pose.pointing is None:
             return 0.5 * _cross(multipliers[:, None], own) @ own.swapaxes(1, 2)

@@ -48,7 +48,7 @@ class Banded:
         out = np.zeros((len(diagonal), self.length * (self.above + 1)))
         out[:, self._diagonal] = diagonal[:, :, self.triangle[0], self.triangle[1]]
         for place, off in zip(self._off, blocks[1:], strict=False):
-            out[:, place] = off.reshape(*off.shape[:2], -1)
+            out[:, place] = off.reshape(*off.shape[:2], place.shape[-1])
         return out.reshape(len(diagonal), self.length, self.above + 1)
 
     def solve(

@@ -46,7 +46,8 @@ def sampled(times: Array, between: int = BETWEEN) -> Array:
 def excesses(problem: Problem, curve: Curve) -> dict[str, Array]:
     """By how much each kind of limit is exceeded (K, n) at the `sampled` times, relative to it; <= 0 where it is kept.
 
-    Those of position relative to half the range. The jerk, constant in an interval, is that before each sample.
+    Those of the tool (K, 1), those of position relative to half the range. The jerk, constant in an interval, is that
+    before each sample.
     """
     bounds, moments = problem.bounds, sampled(curve.times)
     q, v, a = curve(moments), curve(moments, 1), curve(moments, 2)

@@ -11,27 +11,31 @@ from pipeline.common.errors import InputError
 from pipeline.config.methods import LsvOptions, PmkeOptions
 from pipeline.evaluation.evaluation import evaluate
 from pipeline.methods.lsv import lsv
-from pipeline.methods.pmke import predictive
+from pipeline.methods.pmke.exact import ExactWindow, Found
 from pipeline.methods.pmke.predictive import pmke
+from pipeline.methods.pmke.predictor import SAMPLE, Predictor
+from pipeline.methods.pmke.window import Window
 from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Status
 
 Make = Callable[[int, int], Problem]
 Seen = list[tuple[Array, Array, Array, Array, BSpline]]
 
+NOTHING = Found(np.zeros(0), np.zeros(0), np.zeros(2, bool), np.zeros(0), 0)
+
 
 @pytest.fixture
 def predictions(monkeypatch: pytest.MonkeyPatch) -> Seen:
     """Knots (h + 1,), points (h + 1, n), qd, qdd at the start and the spline of every prediction made."""
     seen: Seen = []
-    interpolate = predictive._Predictor._interpolate
+    interpolate = Predictor._interpolate
 
-    def watched(self: predictive._Predictor, times: Array, points: Array, qd: Array, qdd: Array) -> BSpline:
-        spline = interpolate(self, times, points, qd, qdd)
-        seen.append((times, points, qd, qdd, spline))
+    def watched(self: Predictor, now: float, points: Array, qd: Array, qdd: Array) -> BSpline:
+        spline = interpolate(self, now, points, qd, qdd)
+        seen.append((now + self.times, points, qd, qdd, spline))
         return spline
 
-    monkeypatch.setattr(predictive._Predictor, "_interpolate", watched)
+    monkeypatch.setattr(Predictor, "_interpolate", watched)
     return seen
 
 
@@ -128,9 +132,43 @@ def test_the_gain_takes_the_drift_away(problem: Make) -> None:
 
 
 def test_predictions_that_fail_are_said(problem: Make, monkeypatch: pytest.MonkeyPatch) -> None:
-    solve = predictive.Window.solve
-    monkeypatch.setattr(predictive.Window, "solve", lambda *a, **k: solve(*a, **{**k, "max_iterations": 0}))
+    solve = Window.solve
+    monkeypatch.setattr(Window, "solve", lambda *a, **k: solve(*a, **{**k, "max_iterations": 0}))
     monkeypatch.setattr("pipeline.methods.pmke.window.quasi_newton", lambda cost, rows, x, **_: x)
+    monkeypatch.setattr(ExactWindow, "solve", lambda *_: NOTHING)
     solution = pmke(problem(1, 100), PmkeOptions(dt=0.05))[0]
     assert solution.status is Status.NOT_CONVERGED
     assert "17 of 17 predictions did not converge, the first at t = 0.00 s" in solution.message
+
+
+def test_ipopt_confirms_what_is_asked_for_and_takes_over_where_newton_ends(
+    problem: Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked, logs, motions = problem(4, 100), {}, {}
+
+    def run(name: str, **options: str) -> None:
+        solution = pmke(asked, PmkeOptions(dt=0.1, **options))[0]  # type: ignore[arg-type]
+        logs[name], motions[name] = solution.statistics["predictions"], solution.trajectory.q
+
+    for confirm in ("every", "last", "none"):
+        run(confirm, confirm=confirm)
+    monkeypatch.setattr(ExactWindow, "solve", lambda *_: NOTHING)
+    run("ipopt", confirm="none")
+    for name, confirmed in (("every", 17), ("last", SAMPLE), ("none", 0), ("ipopt", 0)):
+        apart = [entry["apart_from_ipopt"] for entry in logs[name] if entry["apart_from_ipopt"] is not None]
+        assert len(apart) == confirmed
+        assert max(apart, default=0.0) < 1e-6
+        by_ipopt = name in ("every", "ipopt")
+        assert {entry["status"] for entry in logs[name]} == ({"success"} if by_ipopt else {"newton"})
+        np.testing.assert_allclose(motions[name], motions["ipopt"], atol=1e-5)
+
+
+def test_projected_steps_leave_no_drift(problem: Make) -> None:
+    asked = problem(2, 100)
+    judged = evaluate(asked, pmke(asked, PmkeOptions(dt=0.05, project=True, confirm="none"))[0])
+    assert judged.status is Status.SOLVED
+    assert judged.tracking_error.max() < 1e-8
+    with pytest.raises(
+        InputError, match=r"method\.pmke\.gain corrects an error that method\.pmke\.project leaves none"
+    ):
+        pmke(asked, PmkeOptions(project=True, gain=1.0))

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from pipeline.build.problem import prepare
+from pipeline.common.errors import InputError
 from pipeline.config.methods import PmkeOptions, RecedingOptions
 from pipeline.evaluation.evaluation import evaluate
 from pipeline.methods.global_planner.planner import global_planner
@@ -38,6 +39,10 @@ def test_limits_hold_at_every_executed_knot_and_the_cost_is_near_the_optimum() -
     log = done.statistics["predictions"]
     assert [round(entry["time"], 6) for entry in log] == pytest.approx(np.arange(0, 10, 0.6).tolist())
     assert all(entry["converged"] and entry["wall_time_s"] > 0 for entry in log)
+    assert {entry["status"] for entry in log} == {"newton"}
+    apart = [entry["apart_from_ipopt"] for entry in log if entry["apart_from_ipopt"] is not None]
+    assert len(apart) == 10
+    assert max(apart) < 1e-4, "IPOPT moves the windows"
     assert done.statistics["update_interval"] == pytest.approx(0.6)
 
 
@@ -83,3 +88,21 @@ def test_the_knots_reach_to_the_end_of_the_path() -> None:
     np.testing.assert_allclose(_knots(times, 8, 10, 3), [0.8, 0.9, 1.0])
     np.testing.assert_allclose(_knots(times, 2, 4, 0), [0.2, 0.3, 0.4])
     np.testing.assert_allclose(_knots(times, 6, 8, 5), [0.6, 0.7, 0.8, 0.9, 1.0])
+
+
+@pytest.mark.slow
+def test_torques_at_their_limit_and_windows_cut_off() -> None:
+    """One program an update: what it does not solve is followed on the plan before, and no knot is beyond a limit."""
+    asked = trajectory3("limits=joint_torque_power", "limits.torque=0.012", "limits.power=null")
+    done = receding(asked, replace(WINDOW, real_time_iterations=3))[0]
+    judged = evaluate(asked, done)
+    assert judged.limit_excess["torque"] > -0.3, "the limit is not felt: the test shows nothing"
+    assert max(judged.limit_excess.values()) <= 1e-6
+    assert all(entry["iterations"] == 3 for entry in done.statistics["predictions"] if entry["status"] == "newton")
+
+
+def test_what_receding_does_not_serve_is_said() -> None:
+    with pytest.raises(InputError, match="receding: limits of acceleration together with terms beside the kinetic"):
+        receding(trajectory3("limits.acceleration=1", "objective=torque"))
+    with pytest.raises(InputError, match="receding: the joints are to rest at an end"):
+        receding(replace(trajectory3(), rest=(True, False)))
