@@ -8,8 +8,7 @@ from pipeline.artifacts.bands import closest
 from pipeline.artifacts.report import Report
 from pipeline.artifacts.verdict import baseline, saving, sent, status, weighs
 from pipeline.methods.registry import METHODS
-from pipeline.problem.integrals import INTEGRALS
-from pipeline.studies.front import DURATION, Front, cost
+from pipeline.studies.front import Front, cost, unit
 
 SHORT = {"kinetic_energy": "energy", "torque": "torque²", "velocity_norm": "velocity²"}  # for the heads of columns
 
@@ -25,8 +24,7 @@ def rows(report: Report) -> list[dict[str, str]]:
         row = {"motion": e.label, "status": status(e)}
         found = e.solution.found
         for name in names:
-            unit = "s" if name == DURATION else INTEGRALS[name].unit
-            title = f"{SHORT.get(name, name.replace('_', ' '))} [{unit}]"
+            title = f"{SHORT.get(name, name.replace('_', ' '))} [{unit(name)}]"
             row[title] = f"{cost(e, name):.4g}" if found else ""
         if against is not None:
             known = found and e.solution.event_time is None and e is not against

@@ -120,10 +120,16 @@ def cost(motion: Evaluation, name: str) -> float:
     return own[name] if name in own else motion.integral(name)
 
 
+def unit(name: str) -> str:
+    """Of that cost."""
+    own = {DURATION: "s", TOLERANCE: "m"}
+    return own[name] if name in own else INTEGRALS[name].unit
+
+
 def label(name: str) -> str:
     """Of an axis, with its unit."""
-    own = {DURATION: "motion time [s]", TOLERANCE: "largest distance from the path [m]"}
-    return own[name] if name in own else f"{INTEGRALS[name].label} [{INTEGRALS[name].unit}]"
+    own = {DURATION: "motion time", TOLERANCE: "largest distance from the path"}
+    return f"{own[name] if name in own else INTEGRALS[name].label} [{unit(name)}]"
 
 
 def dominated(values: Array) -> Array:

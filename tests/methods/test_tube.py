@@ -21,7 +21,7 @@ from pipeline.problem.costs import objective_values
 from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Solution, Status, Trajectory
 from pipeline.program.transcription import transcribe
-from pipeline.studies.front import Front, draw, table
+from pipeline.studies.front import Front, draw, table, unit
 from tests.benchmarks.peer import QUIET, ROBOT, PlanarArm
 from tests.program.test_spline import weighted
 from tests.support import composed, free_line, robot
@@ -101,7 +101,9 @@ def test_what_a_tolerance_buys() -> None:
     assert list(front.table["bound"]) == [np.inf, pytest.approx(TOLERANCE / 100), TOLERANCE]
     tolerances, energies = (front.table[name].to_numpy() for name in front.objectives)
     assert tolerances[0] < 0.5 * tolerances[1]  # on its path at its knots, of which there are few
-    assert tolerances[1:] == pytest.approx([TOLERANCE / 100, TOLERANCE], rel=1e-2)
+    assert np.all(tolerances[1:] <= np.array([TOLERANCE / 100, TOLERANCE]))
+    assert tolerances[1:] == pytest.approx([TOLERANCE / 100, TOLERANCE], rel=0.05)
+    assert unit("path_tolerance") == "m"
     assert np.all(np.diff(energies) < 0)
     assert draw(front, "a front").axes[0].get_xlabel() == "largest distance from the path [m]"
 
