@@ -20,7 +20,7 @@ COSTS = {"kinetic_energy": "energy", "torque": "squared torque"}  # what is save
 def sent(report: Report) -> Evaluation | None:
     """The motion that is exported."""
     exported = report.find(Resampled)
-    return next((e for e in report.motions.evaluations if exported and called(e) == called(exported)), None)
+    return next((e for e in report.motions.evaluations if exported and exported.is_of(e)), None)
 
 
 def first(report: Report) -> Evaluation | None:
@@ -41,14 +41,14 @@ def verdict(report: Report) -> str:
     if exported is not None:
         return f"Send {called(motion)}: {reasons}"
     if refused is not None and refused.refused:
-        fault = next(one.fault for one in refused.refused if called(one) == called(motion))
+        fault = next(one.fault for one in refused.refused if one.is_of(motion))
         return f"Nothing to send: {called(motion)}, the best found, {fault}. {refused.instead}{_capital(reasons)}"
     return f"Best found: {called(motion)}: {reasons}"
 
 
-def called(e: Evaluation | Resampled) -> str:
+def called(e: Evaluation) -> str:
     """`global 1`, the first optimum with its number too."""
-    return f"{e.method} {e.optimum if isinstance(e, Resampled) else e.solution.optimum}"
+    return f"{e.method} {e.solution.optimum}"
 
 
 def status(e: Evaluation) -> str:

@@ -7,7 +7,7 @@ from pipeline.build.checks import check_problem, require_reach
 from pipeline.build.collision import make_own, require_free_path
 from pipeline.build.goal import make_limits, make_objective, make_obstacles
 from pipeline.build.path import make_knots, make_reference, make_task
-from pipeline.build.rest import check_rest, ends_at_rest
+from pipeline.build.rest import check_rest, ends_at_rest, unless_unlimited
 from pipeline.build.robot import initial, load
 from pipeline.build.tool import check_tool
 from pipeline.config.run import RunConfig
@@ -44,6 +44,7 @@ def prepare(config: RunConfig) -> Problem:
         free_law=free_law,
         free_duration=free_duration,
     )
+    problem = unless_unlimited(config, problem)
     check_problem(problem)
     if config.base.kind == "fixed":
         require_reach(problem)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,17 +17,17 @@ from pipeline.problem.problem import Boundary, Problem
 from pipeline.robot.limits import STILL
 
 PACE = ("velocity", "acceleration", "jerk", "torque", "power")
-
-
+STUCK = 1e-6  # [rad/s^2] and below: of a motion that does not get away from a singular start; it says nothing
 SHARE = 0.05  # of the motion time, in which the suggested acceleration reaches the motion's largest joint speed
 
 
 def ends_at_rest(config: RunConfig, reference: Reference) -> tuple[bool, bool]:
     """Whether all joints rest at the start, at the end.
 
-    Where `boundary.rest` says nothing they rest at both, so that the motion can be sent: but for the arms of `robots/`,
-    whose motions are the papers', for a path that is entered at speed, and where no method can be told to rest, since
-    the planner does not run or the base moves or is held.
+    Where `boundary.rest` says nothing they rest at both, so that the motion can be sent, if the accelerations of all
+    joints are limited (`unless_unlimited`): but for the arms of `robots/`, whose motions are the papers', for a path
+    that is entered at speed, and where no method can be told to rest, since the planner does not run or the base moves
+    or is held.
     """
     if config.timing.law == "optimal" or config.timing.duration == "shortest":
         return True, True
@@ -36,6 +37,14 @@ def ends_at_rest(config: RunConfig, reference: Reference) -> tuple[bool, bool]:
     planned = "global" in config.methods and config.base.kind == "fixed" and config.objective.kind != "reaction"
     rests = planned and reference.timing.at_rest and not papers
     return rests, rests
+
+
+def unless_unlimited(config: RunConfig, problem: Problem) -> Problem:
+    """Without rest where nobody asked for it and it would have no best motion, or one that speeds up in no time. What
+    is found is then not exported, and the line that says so says what would be.
+    """
+    told = config.boundary.rest is not None or problem.free_timing
+    return problem if told or np.isfinite(problem.bounds.acceleration).all() else replace(problem, rest=(False, False))
 
 
 def check_rest(problem: Problem) -> None:
@@ -92,7 +101,8 @@ def suggested(problem: Problem) -> float:
     torque = np.minimum(problem.bounds.torque, np.where(effort > STILL, effort, np.inf))
     still = np.zeros_like(motion)
     left = np.maximum(torque - np.abs(arm.inverse_dynamics(motion, still, still)), 0.0)
-    least = min(least, float((left / np.abs(arm.mass_matrix(motion)).sum(axis=2)).min())) or 1.0
+    least = min(least, float((left / np.abs(arm.mass_matrix(motion)).sum(axis=2)).min()))
+    least = least if least > STUCK else 1.0
     digit = 10.0 ** np.floor(np.log10(least))
     return float(f"{max(np.floor(least / digit), 1.0) * digit:.1g}")
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
+from pipeline.build.gcode import is_gcode
 from pipeline.common.errors import ConfigError
 from pipeline.config.path import WaypointsConfig
 from pipeline.config.run import RunConfig
-from pipeline.path.gcode import SUFFIXES
 
 WORD = r"\+{0,2}([a-z_]+)\.([a-z_.]+)=.*"  # key=value of a group
 
@@ -44,7 +44,7 @@ def _why(group: str, key: str, config: RunConfig) -> str:
         return "" if first in runs else f"{first} does not run (methods = [{','.join(config.methods)}])"
     if group in ("closed_loop", "control", "candidate_study", "identification") and first != "run":
         return "" if getattr(config, group).run else f"{group}.run = false"
-    gcode = isinstance(config.path, WaypointsConfig) and config.path.file.lower().endswith(SUFFIXES)
+    gcode = isinstance(config.path, WaypointsConfig) and is_gcode(config.path)
     feeds = ("from_file",) if gcode and config.timing.law == "from_file" else ()
     nothing = {
         "export.rate": ("export.method = none", config.export.method == "none"),

@@ -49,6 +49,10 @@ class Resampled(Result):
     faults: tuple[str, ...] = ()
     strays: bool = False
 
+    def is_of(self, motion: Evaluation) -> bool:
+        """Whether these are the samples of that motion."""
+        return (self.method, self.optimum) == (motion.method, motion.solution.optimum)
+
     @property
     def fault(self) -> str:
         """The first of its faults in one sentence."""

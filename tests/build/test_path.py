@@ -32,6 +32,7 @@ def test_a_closed_path_with_the_tool_down_closes(tmp_path: Path) -> None:
     assert problem.gap == (pytest.approx(0.0, abs=1e-12), pytest.approx(4e-10, rel=1e-4))
 
 
+@pytest.mark.slow
 def test_the_gap_of_an_open_turn_is_its_angle() -> None:
     with pytest.raises(PathError, match=r"boundary = cyclic: the path ends 0\.3 rad from where it starts"):
         prepare(composed(*POSE, *CIRCLE, "path.turn=[0.3,0,0]"))

@@ -16,6 +16,8 @@ from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Status
 from tests.support import composed, robot
 
+pytestmark = pytest.mark.slow  # together: each composes and prepares problems in space
+
 SPACE = ("path.direction=[0,1,0]", "path.length=0.05", "timing.duration=2", "timing.steps=10")
 
 

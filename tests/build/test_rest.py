@@ -12,6 +12,8 @@ from pipeline.build.problem import prepare
 from pipeline.common.errors import ConfigError, RobotError
 from tests.support import ROOT, composed
 
+pytestmark = pytest.mark.slow  # together: each composes and prepares problems in space
+
 ENDS, START = "boundary.rest=[start,end]", "boundary.rest=[start]"
 SPEED = ("timing=constant_speed", "timing.duration=2")
 
@@ -90,7 +92,7 @@ def test_accelerations_of_the_robot_give_way() -> None:
     own = prepare(composed(*PANDA, "limits.acceleration=3"))
     np.testing.assert_array_equal(own.bounds.acceleration, 3.0)
     with pytest.raises(ConfigError, match="there is no best motion from rest"):
-        prepare(composed(*PANDA, "limits.acceleration=1e9"))
+        prepare(composed(*PANDA, ENDS, "limits.acceleration=1e9"))
     with pytest.raises(RobotError, match=r"^robot\.limits = .*panda_limits\.yaml: states limits of panda_joint1, .*"):
         prepare(composed("boundary.rest=[start]", "robot.limits=robots/panda_limits.yaml"))
 
@@ -102,8 +104,9 @@ def test_an_arm_of_ones_own_is_told_a_number(tmp_path: Path) -> None:
     for name, effort in (("strong", "0.4"), ("weak", "0.004")):
         file = tmp_path / f"{name}.urdf"
         file.write_text(text.replace('effort="0.4"', f'effort="{effort}"'), encoding="utf-8")
+        assert prepare(composed(*OWN, f"robot.urdf={file}", "timing.duration=1")).rest == (False, False)
         with pytest.raises(ConfigError) as refused:
-            prepare(composed(*OWN, f"robot.urdf={file}", "timing.duration=1"))
+            prepare(composed(*OWN, f"robot.urdf={file}", "timing.duration=1", ENDS))
         assert str(refused.value).endswith("boundary.rest=[] lets it jump")
         numbers[name] = float(re.findall(r"set limits.acceleration, such as (\S+) rad/s", str(refused.value))[0])
         assert all(prepare(composed(*OWN, f"robot.urdf={file}", f"limits.acceleration={numbers[name]}")).rest)

@@ -57,6 +57,7 @@ def test_what_would_not_end_is_refused(case: str) -> None:
         composed(*words)
 
 
+@pytest.mark.slow
 def test_what_does_not_run_is_not_counted() -> None:
     assert composed("methods=[lsv]", "method.pmke.dt=1e-9", "method.global.layers=58").timing.duration == 10.0
     assert composed("timing.steps=20000", "method.global.optimised=4000").timing.steps == 20000

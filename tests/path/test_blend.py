@@ -13,6 +13,7 @@ from pipeline.path.through import through
 SQUARE = np.array([[0, 0], [0.1, 0], [0.1, 0.1], [0, 0.1], [0, 0]], dtype=float)
 
 
+@pytest.mark.slow
 @given(st.floats(0.05, 2.9), st.sampled_from([0.001, 0.005, 0.02]))
 def test_the_deviation_at_a_corner_is_the_one_asked_for(turn: float, blend: float) -> None:
     """Measured on a fine grid, from the corner itself."""

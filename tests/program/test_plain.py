@@ -57,6 +57,7 @@ def test_its_cost_and_its_gradient(free: Problem, rng: np.random.Generator) -> N
     np.testing.assert_allclose(gradient, exact, atol=1e-6 * np.abs(exact).max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("words", [("+experiment=traj3",), ("+experiment=sim1",), ("+experiment=panda_pose",)])
 def test_ipopt_stops_at_once_at_an_optimum(words: tuple[str, ...]) -> None:
     """panda_pose: without the velocity limits, which it does not reach; its positions stay limited."""

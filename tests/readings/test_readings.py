@@ -14,6 +14,7 @@ from tests.readings.__main__ import FILE, marked
 from tests.readings.planar import Q_INIT, SIMULATION, TRAJECTORIES, bias, inertia
 
 
+@pytest.mark.slow
 def test_pmke_read_as_the_project_reads_it() -> None:
     config = experiment("traj1")
     problem = prepare(config)

@@ -90,9 +90,9 @@ def test_a_sweep_leaves_no_thread_and_no_arm(tmp_path: Path, monkeypatch: pytest
         living.append((len(os.listdir("/proc/self/task")), arms, len(everything)))
         return code
 
-    words = ("-m", "methods=[lsv,pmke,global]", *small, *few, "seed=1,2,3,4", "hydra.sweep.dir=all")
+    words = ("-m", "methods=[lsv,pmke,global]", *small, *few, "seed=1,2,3", "hydra.sweep.dir=all")
     assert call(monkeypatch, None, *words, entry=lambda: main.run_job(watched)).code == 0
     threads, arms, objects = zip(*living[1:], strict=True)
     assert max(threads) == threads[0]
     assert max(arms) == arms[0]
-    assert objects[2] - objects[1] < 500
+    assert objects[1] - objects[0] < 500

@@ -66,6 +66,7 @@ def test_a_problem_that_the_controller_does_not_serve_is_refused() -> None:
         state(composed(*words))
 
 
+@pytest.mark.slow
 def test_how_long_updates_took() -> None:
     problem = prepare(composed("timing.duration=4"))
     config = composed()
