@@ -109,9 +109,20 @@ def near(problem: Problem, clearance: Clearance, curve: Callable[..., Array], kn
     """Both along `curve(moment, order)`, a cubic between `knots` (N + 1,), with the margins of a problem."""
     around, own = problem.obstacles, problem.own
     return Near(
-        closest(clearance, clearance.obstacles, curve, knots, 0.0 if around is None else around.margin),
-        closest(clearance, clearance.own, curve, knots, 0.0 if own is None else own.margin),
+        _known(clearance, clearance.obstacles, curve, knots, 0.0 if around is None else around.margin),
+        _known(clearance, clearance.own, curve, knots, 0.0 if own is None else own.margin),
     )
+
+
+def _known(
+    clearance: Clearance, pairs: list[Pair], curve: Callable[..., Array], knots: Array, margin: float
+) -> Closest:
+    """The least clearance, which is not said to fall short of a margin that `lacking` knows to be kept."""
+    found = closest(clearance, pairs, curve, knots, margin)
+    if not found.bound < margin <= found.distance:
+        return found
+    kept = min(margin, closest(clearance, pairs, curve, knots, margin, margin).bound)
+    return replace(found, bound=max(found.bound, kept))
 
 
 def lacking(problem: Problem, clearance: Clearance, trajectory: Trajectory) -> float:

@@ -285,7 +285,7 @@ def test_what_is_not_served_has_a_reason() -> None:
         assert why_not(prepare(composed(f"+experiment={name}"))) is None
     obstacle = prepare(composed("+experiment=panda_obstacle"))
     assert why_not(replace(obstacle, limits=None)) is None
-    assert "obstacles and torques" in str(why_not(obstacle))
+    assert "clearances and torques" in str(why_not(obstacle))
     for words, word in ((("boundary=free",), "not fixed"), (("objective=base_rotation",), "rotation")):
         assert word in str(why_not(prepare(composed("+experiment=floating3r", *words))))
 

@@ -16,6 +16,7 @@ from pipeline.methods.global_planner.optimum import Optimum, cleared, stays_on_p
 from pipeline.methods.method import Context
 from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Trajectory
+from pipeline.program.spline.curve import Curve
 
 
 def keeps_own(problem: Problem) -> bool:
@@ -35,6 +36,14 @@ def apart(problem: Problem, optima: list[Optimum], options: GlobalOptions, conte
     near = [k for k, one in enumerate(optima) if lacking(only, clearance, Trajectory(problem.times, one.q)) > 0]
     again = iter(context.workers.map(solved_again, (problem, problem.times, options), [optima[k] for k in near]))
     return [next(again) if k in near else optimum for k, optimum in enumerate(optima)]
+
+
+def short(problem: Problem, curve: Curve) -> float:
+    """By how much [m] a spline falls short of a margin that it has to keep, as the evaluation certifies it."""
+    if not problem.keeps_clear:
+        return 0.0
+    clearance = Clearance(problem.task.arm, problem.obstacles, problem.own)
+    return lacking(problem, clearance, Trajectory(curve.times, curve.q, curve.ends))
 
 
 def solved_again(context: tuple[Problem, Array, GlobalOptions], optimum: Optimum) -> Optimum:
