@@ -5,9 +5,15 @@ On a piece of the curve a solid that joints a + 1 .. b move against another one 
     sum over j of rho_j integral |qd_j| dt,    j = a + 1 .. b,
 
 against it, with rho_j the reach of the solid from joint j's axis in any configuration (1 for a sliding joint). So a
-distance at one moment bounds those of the piece around it. Pieces whose bound is below the least distance found are
-halved, the lowest first, until the bound is within `tolerance` of it. |qd_j| is at most its largest value on a piece,
-which is exact: the derivative of a cubic is a parabola.
+distance at one moment bounds those of the piece around it. So does a plane between them that stands still against the
+first one: the second one's points leave the straight line along which they move now, within t, by at most
+
+    1/2 t^2 (sum over j of rho_j max |qdd_j| + sum over j, k of rho_max(j,k) max |qd_j| max |qd_k|),
+
+and of those that go straight the one nearest to the plane at any time is so at an end of the piece. That is the sharper
+one of the two on small pieces. Pieces whose bound is below the least distance found are halved, the lowest first, until
+the bound is within `tolerance` of it. |qd_j| and |qdd_j| are at most their largest values on a piece, which are exact:
+the derivatives of a cubic are a parabola and a line.
 """
 
 from __future__ import annotations
@@ -75,8 +81,10 @@ class Motion:
         # the parabola through begin, middle and end of each interval: a s^2 + b s + c on s in [0, 1]
         first, last = ends[:-1], ends[1:]
         self.a, self.b, self.c = 2 * (first + last) - 4 * half, 4 * half - 3 * first - last, first
-        every = self._most(np.arange(len(middle)), np.zeros(len(middle)), np.ones(len(middle)))
-        self.gone = np.vstack([np.zeros(every.shape[1]), np.cumsum(every * np.diff(knots)[:, None], axis=0)])
+        dt = np.diff(knots)[:, None]
+        self.most = every = self._most(np.arange(len(middle)), np.zeros(len(middle)), np.ones(len(middle)))
+        self.bend = np.maximum(np.abs(self.b), np.abs(2 * self.a + self.b)) / dt  # max |qdd| of each interval
+        self.gone = np.vstack([np.zeros(every.shape[1]), np.cumsum(every * dt, axis=0)])
         most = np.abs(curve(knots)).max(axis=0) + np.diff(self.gone, axis=0).max(axis=0)
         clearance.at(np.zeros(len(most)))
         self.reach = np.array([reaches(clearance, pair, most) for pair in pairs])
@@ -95,6 +103,21 @@ class Motion:
         i = int(begin)
         most = self._most(np.array([i]), np.array([begin - i]), np.array([end - i]))[0]
         return np.asarray(most * (end - begin) * (self.knots[i + 1] - self.knots[i]))
+
+    def bent(self, piece: Piece) -> float:
+        """Of the pair's second solid against its first: how much [m/s^2] its points' velocities change, at most."""
+        rho, run = self.reach[piece.pair], slice(int(piece.begin), int(np.ceil(piece.end)))
+        most, bend = self.most[run].max(axis=0) * (rho > 0), self.bend[run].max(axis=0)
+        return float(rho @ (bend + most * (2 * np.cumsum(most) - most)))
+
+    def bound(self, pair: Pair, piece: Piece, cut: float, apart: tuple[float, float, Array]) -> float:
+        """What the distance on all of a piece is at least [m], by that at its place `cut`, where the arm is."""
+        ways = (self.way(*ends) for ends in ((piece.begin, cut), (cut, piece.end)))
+        by_way = apart[0] - max(float(self.reach[piece.pair] @ way) for way in ways)
+        now = self.time(cut)
+        spans = self.time(piece.begin) - now, self.time(piece.end) - now
+        straight = self.clearance.going(pair, apart[2], self.curve(now, 1), spans)
+        return max(by_way, straight - self.bent(piece) * max(span * span for span in spans) / 2)
 
     def time(self, place: float) -> float:
         """Of a place between knots."""
@@ -168,10 +191,10 @@ def closest(
         if fresh:
             left -= 1
             motion.go(cut)
-            ways = (motion.way(*ends) for ends in ((piece.begin, cut), (cut, piece.end)))
-            apart = clearance.apart(pairs[piece.pair])
-            best = nearer(best, pairs[piece.pair], apart, motion.time(cut))
-            bound = max(bound, apart[0] - max(float(motion.reach[piece.pair] @ way) for way in ways))
+            pair = pairs[piece.pair]
+            apart = clearance.apart(pair)
+            best = nearer(best, pair, apart, motion.time(cut))
+            bound = max(bound, motion.bound(pair, piece, cut, apart))
             count += 1
             heapq.heappush(heap, (bound, count, False, piece))
             continue
@@ -180,9 +203,9 @@ def closest(
             heapq.heappush(heap, (bound, count, True, Piece(piece.pair, begin, end)))
 
 
-def nearer(best: Closest, pair: Pair, apart: tuple[float, float], time: float) -> Closest:
+def nearer(best: Closest, pair: Pair, apart: tuple[float, float, Array], time: float) -> Closest:
     """The nearer one of what was known and a pair's distance, between its two bounds."""
-    low, high = apart
+    low, high, _ = apart
     return Closest(low, high, time, pair.first.name, pair.second.name) if low < best.bound else best
 
 

@@ -20,7 +20,7 @@ from pipeline.evaluation.plant import add_arm, weld
 from pipeline.model.arm import Arm
 from pipeline.model.obstacles import Obstacles, Own
 from pipeline.robot import solids
-from pipeline.robot.separation import Solid, along, distance
+from pipeline.robot.separation import Solid, along, nearest
 from pipeline.robot.shapes import Shape
 from pipeline.robot.touching import groups
 
@@ -75,7 +75,7 @@ class Clearance:
         self.obstacles = [Pair(other, body) for body in moving for other in others]
         self.own = [Pair(a, b) for one, two in pairs for a in links.get(one, []) for b in links.get(two, [])]
         self.joints = parts.joints
-        self._order = [joint.position_start() for joint in parts.joints]
+        self._order = [joint.position_start() for joint in parts.joints]  # those of velocities too: one each
         self._diagram = builder.Build()
         self._context = self._diagram.CreateDefaultContext()
         self._plant_context = self._plant.GetMyMutableContextFromRoot(self._context)
@@ -114,30 +114,56 @@ class Clearance:
         """The centres (B, 3) [m] of the balls around solids."""
         return np.array([body.drake.EvalPoseInWorld(self._plant_context) @ body.center for body in bodies])
 
-    def apart(self, pair: Pair) -> tuple[float, float]:
-        """A lower and an upper bound [m] on the signed distance of a pair where the arm is now. They agree to
-        a micrometre; where the solids overlap, both are Drake's.
+    def apart(self, pair: Pair) -> tuple[float, float, Array]:
+        """A lower and an upper bound [m] on the signed distance of a pair where the arm is now, and the unit vector
+        (3,) from the first to the second that shows the lower one. They agree to a micrometre; where the solids
+        overlap, both are Drake's.
         """
-        first, second = (
-            body.solid.moved(pose.rotation().matrix(), pose.translation())
-            for body in (pair.first, pair.second)
-            for pose in [body.drake.EvalPoseInWorld(self._plant_context)]
-        )
+        first, second = self._placed(pair)
         if first.radius and second.radius:  # Drake may never come back from capsules whose ends meet
-            return distance(first, second)
+            return nearest(first, second)
         try:
             query = self._scene.get_query_output_port().Eval(self._scene_context)
             found = query.ComputeSignedDistancePairClosestPoints(pair.first.geometry, pair.second.geometry)
         except RuntimeError:  # what Drake's FCL cannot decide (Drake's issues 21673 and 21234)
-            return distance(first, second)
+            return nearest(first, second)
         normal = -np.asarray(found.nhat_BA_W)
         size = float(np.linalg.norm(normal))
-        low = along(first, second, normal / size) if size > 0.5 else -np.inf
+        if not size > 0.5:
+            return nearest(first, second)
+        normal = normal / size
+        low = along(first, second, normal)
         if found.distance < 0 and low < 0:
-            return float(found.distance), float(found.distance)
+            return float(found.distance), float(found.distance), normal
         if found.distance - low <= AGREES:
-            return min(low, found.distance), float(found.distance)
-        return distance(first, second)
+            return min(low, found.distance), float(found.distance), normal
+        return nearest(first, second)
+
+    def _placed(self, pair: Pair) -> list[Solid]:
+        poses = [body.drake.EvalPoseInWorld(self._plant_context) for body in (pair.first, pair.second)]
+        solids = pair.first.solid, pair.second.solid
+        return [s.moved(at.rotation().matrix(), at.translation()) for s, at in zip(solids, poses, strict=True)]
+
+    def going(self, pair: Pair, n: Array, qd: Array, spans: tuple[float, ...]) -> float:
+        """The least distance [m] that the unit vector n (3,), from the first to the second, shows at any of the `spans`
+        [s] from now, if the points of the second went on as fast against the first as they go at the speeds qd (n,).
+        """
+        speeds = np.zeros(len(qd))
+        speeds[self._order] = np.where(np.arange(len(qd)) < pair.first.joints, 0.0, qd)
+        self._plant.SetVelocities(self._plant_context, speeds)
+        first, second = self._placed(pair)
+        origin = pair.second.drake.EvalPoseInWorld(self._plant_context).translation()
+        speed = pair.second.drake.EvalSpatialVelocityInWorld(self._plant_context)
+        shown = n @ (origin - first.support(n)) - first.radius
+        turning, moving = np.cross(n, speed.rotational()), float(n @ speed.translational())
+        found = np.inf
+        for span in spans:
+            # n (x + s (v + w x r)) with r = x - origin is n origin + s n v + r (n + s n x w)
+            turned = n + span * turning
+            size = float(np.sqrt(turned @ turned))
+            reached = turned @ (second.support(-turned / size) - origin) - second.radius * size
+            found = min(found, float(shown + span * moving + reached))
+        return found
 
     def __call__(self, q: Array) -> Array:
         """The smallest distances (K,) [m] from obstacles at q (K, n): infinite without obstacles, nan where q is not

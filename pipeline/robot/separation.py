@@ -78,28 +78,35 @@ def distance(a: Solid, b: Solid) -> tuple[float, float]:
     """A lower and an upper bound [m] on the distance, which meet; where the cores overlap, less the radii, twice: they
     overlap by so much at least.
     """
+    return nearest(a, b)[:2]
+
+
+def nearest(a: Solid, b: Solid) -> tuple[float, float, Array]:
+    """The same, and the unit vector (3,) from a to b that shows the lower one (any, where the cores overlap)."""
     n = b.points.mean(axis=0) - a.points.mean(axis=0)
     size = float(np.sqrt(n @ n))
     n = n / size if size > TOUCHES else np.array([0.0, 0.0, 1.0])
     found: list[Array] = []
-    low, high = -np.inf, np.inf
+    low, high, best = -np.inf, np.inf, n
     for _ in range(STEPS):
         new = b.support(-n) - a.support(n)
-        low = max(low, float(n @ new))
+        shown = float(n @ new)
+        if shown > low:
+            low, best = shown, n
         if high - low < MEET:
             break
         found.append(new)
         corners = np.array(found).T
         scale = max(float(np.abs(corners).max()), TOUCHES)
         weights, _ = nnls(np.vstack([corners / scale, np.ones(len(found))]), np.array([0.0, 0.0, 0.0, 1.0]))
-        nearest = corners @ weights / weights.sum()
-        high = float(np.sqrt(nearest @ nearest))
+        closest = corners @ weights / weights.sum()
+        high = float(np.sqrt(closest @ closest))
         found = [point for point, weight in zip(found, weights, strict=True) if weight > 0]
         if high <= TOUCHES:
             low = high = 0.0
             break
-        n = nearest / high
-    return min(low, high) - a.radius - b.radius, high - a.radius - b.radius
+        n = closest / high
+    return min(low, high) - a.radius - b.radius, high - a.radius - b.radius, best
 
 
 def depth(solid: Solid, points: Array) -> Array:

@@ -18,6 +18,8 @@ from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Trajectory
 from pipeline.program.spline.curve import Curve
 
+AGAIN = 100  # iterations of an optimum that is solved again: those that need more do not end well
+
 
 def keeps_own(problem: Problem) -> bool:
     """Whether motions have to keep the arm clear of itself."""
@@ -49,6 +51,7 @@ def short(problem: Problem, curve: Curve) -> float:
 def solved_again(context: tuple[Problem, Array, GlobalOptions], optimum: Optimum) -> Optimum:
     """One of them, from where it is; what remains too near counts as lost."""
     problem, times, options = context
+    options = replace(options, max_iterations=min(options.max_iterations, AGAIN))
     found: Optimum | None = None
     if Batch.without(problem, options) is None:
         found = Batch(problem, options).finish_near(times, optimum)
