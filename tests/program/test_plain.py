@@ -37,8 +37,8 @@ def free() -> Problem:
 
 def test_its_cost_and_its_gradient(free: Problem, rng: np.random.Generator) -> None:
     """The documents' sum on any motion, over more than one binding, divided by the cost it is told."""
-    problem = replace(free, times=np.linspace(0, 2, 25))
-    q = 0.3 * rng.normal(size=(25, 3))
+    problem = replace(free, times=np.linspace(0, 2, 30))
+    q = 0.3 * rng.normal(size=(30, 3))
     program = Plain(problem, problem.times, q)
     program.cost = 2.0
 

@@ -21,7 +21,6 @@ from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Trajectory
 from pipeline.program.feasibility import violations
 from pipeline.program.ipopt import STOPPED
-from pipeline.program.residuals import residuals
 from pipeline.program.transcription import transcribe
 
 # What a coarse grid's optimum needs to be told apart and refined; only the last grid's is reported.
@@ -181,7 +180,7 @@ def optimise(problem: Problem, times: Array, guess: Array, options: GlobalOption
         "cost": cost,
     }
     if last:
-        entry["violation"], entry["optimality"] = residuals(program.drake, outcome.result, program.functions)
+        entry["violation"], entry["optimality"] = program.residuals(outcome)
     return Optimum(q, cost, outcome.converged, outcome.status, solves=[entry])
 
 
