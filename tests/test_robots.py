@@ -169,7 +169,7 @@ def test_the_panda_on_a_line() -> None:
 
 @pytest.mark.slow
 def test_the_panda_holds_its_hand_and_keeps_off_a_ball() -> None:
-    problem = prepare(composed("+experiment=panda_pose_obstacle", "timing.steps=30"))
+    problem = prepare(composed("+experiment=panda_pose_obstacle", "timing.steps=24"))
     best = evaluate(problem, global_planner(problem, replace(FEW, optimised=1, refine_to=None))[0])
     plain = evaluate(problem, lsv(problem)[0])
     assert plain.clearance.min() < 0
