@@ -136,11 +136,8 @@ def _confirmed(report: Report, e: Evaluation) -> str:
     said = ["confirmed by IPOPT"] if "confirmed by IPOPT" in e.solution.evidence else []
     estimate = report.find(Estimate)
     for one in estimate.comparisons if estimate is not None and e.method == "global" else ():
-        other = report.motions.best(one.method)
-        if other is not None:
-            said.append(
-                f"{METHODS[one.method].title.lower()} within {100 * abs(other.objective / e.objective - 1):.2g} %"
-            )
+        if one.same_as == e.solution.optimum and not one.gone_on:
+            said.append(f"{one.method.replace('_', ' ')} leads there too")
     return ", ".join(said)
 
 

@@ -21,7 +21,7 @@ import numpy as np
 from pipeline.common.arrays import Array
 from pipeline.config.methods import GlobalOptions, LowerBoundOptions
 from pipeline.methods.global_planner.planner import finish
-from pipeline.methods.method import Context, Method, Serves
+from pipeline.methods.method import ALONG_LOOPS, Context, Method
 from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Solution, Status, Trajectory
 from pipeline.program.newton import serve
@@ -123,7 +123,7 @@ lower_bound = Method(
     "Best under a bound",
     "#7A5C9E",
     LowerBoundOptions,
-    Serves(redundancy=1, order=1, moving_base=False, rest=False),
+    ALONG_LOOPS,
     solve,
     refuses,
 )

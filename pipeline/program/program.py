@@ -49,8 +49,7 @@ class Lifted:
 
     scaling: Scaling
     guess: Positions
-    stations: NDArray[Any]  # (S, n) unknowns: the positions at which the energy is summed up
-    w: NDArray[Any]  # (S, n) the velocities there, scaled
+    w: NDArray[Any]  # (S, n) the velocities at the stations where the energy is summed up, scaled
     weights: Array  # (S,) [s] of that sum
     left_out: tuple[int, ...] = ()  # knots at which the path is not asked for
     tube: Array  # (N + 1, 2) the shares of the path's tolerances by which it may be left at the knots, if it may
@@ -150,7 +149,7 @@ class Program(Lifted):
         sums = Sums(guess[1:], self.dt, self.guess.costs.tau[1:], self.dt)
         self.scaling = scale(problem, sums, self.guess.costs, self.forces)
         self.w = self.new("w", self.scaling.to_w(self.guess.qd[1:]))
-        self.stations, self.weights = self.y[1:], self.dt
+        self.weights = self.dt
 
     def solve(self, **options: Any) -> tuple[Array, ipopt.Outcome, int]:
         """Solve from the guess: positions (N + 1, n) [rad], IPOPT's outcome, its iterations."""

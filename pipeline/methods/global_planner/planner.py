@@ -15,7 +15,6 @@ from scipy.interpolate import CubicSpline
 
 from pipeline.common.arrays import Array
 from pipeline.config.methods import GlobalOptions
-from pipeline.methods import dynamic_programming
 from pipeline.methods.global_planner.apart import apart, keeps_own, without_own
 from pipeline.methods.global_planner.basins import Basins, basins, ceiling
 from pipeline.methods.global_planner.batch import JUMPS, Batch
@@ -27,7 +26,7 @@ from pipeline.methods.global_planner.smooth import freer, nothing, rough, smooth
 from pipeline.methods.global_planner.starts import Starts
 from pipeline.methods.global_planner.timed import timed
 from pipeline.methods.global_planner.tube import exactly, loosened
-from pipeline.methods.method import WITH_TIMING, Context, Method
+from pipeline.methods.method import ALONG_LOOPS, WITH_TIMING, Context, Method
 from pipeline.model.kinematics import wrap
 from pipeline.problem.limits import LIMIT_KINDS
 from pipeline.problem.problem import Problem
@@ -145,41 +144,58 @@ def by_differences(problem: Problem, options: GlobalOptions, context: Context, l
     solutions = []
     for rank, (fine, moved) in enumerate(ranked):
         said = _said(problem, asked, options, [fine.q]) if rank == 0 else ""
-        own = {"starts_in_basin": members[id(fine)], "solves": fine.solves}
+        own = {"starts_in_basin": members[id(fine)], **(log if rank == 0 else {})}
+        solution = as_solution(problem, fine, options)
         solutions.append(
-            Solution(
-                "global",
-                Trajectory(problem.times, fine.q),
-                Status.SOLVED,
-                "; ".join(filter(None, (said, moved))),
+            replace(
+                solution,
+                message="; ".join(filter(None, (said, moved))),
                 optimum=rank + 1,
-                tracking_tolerance=TRACKING,
-                limits_kept=LIMIT_KINDS,
-                clear_between=options.refine_to is not None,
-                knots_only=options.refine_to is None,
-                evidence=(words if rank == 0 else "") + fine.evidence,
-                statistics={**(log if rank == 0 else {}), **own},
+                evidence=(words if rank == 0 else "") + solution.evidence,
+                statistics={**own, **solution.statistics},
             )
         )
     return solutions
 
 
+def as_solution(problem: Problem, optimum: Optimum, options: GlobalOptions) -> Solution:
+    """An optimum on the knots of the problem as an answer of the planner."""
+    return Solution(
+        "global",
+        Trajectory(problem.times, optimum.q),
+        Status.SOLVED,
+        tracking_tolerance=TRACKING,
+        limits_kept=LIMIT_KINDS,
+        clear_between=options.refine_to is not None,
+        knots_only=options.refine_to is None,
+        evidence=optimum.evidence,
+        statistics={"solves": optimum.solves},
+    )
+
+
 def finish(
-    problem: Problem, times: Array, motions: Array, options: GlobalOptions, context: Context
+    problem: Problem, times: Array, motions: Array, options: GlobalOptions, context: Context, lazy: bool = True
 ) -> tuple[Array, list[Optimum]]:
     """The distinct optima, best first, to which motions (S, N + 1, n) on the knots `times` lead, and the knots that
-    they are on: the problem's, or those that its path needs. Motions that are lost on the way are left out.
+    they are on: the problem's, or those that its path needs. Motions that are lost on the way are left out. lazy: see
+    `by_differences`.
     """
     knots, too_coarse = on_knots(problem, options.refine_to)
     if too_coarse:
         return knots, []
-    problem = replace(problem, times=knots)
+    given, lazy = problem, lazy and keeps_own(problem)
+    problem = replace(without_own(problem) if lazy else problem, times=knots)
     batch = Batch(problem, options) if Batch.without(problem, options) is None else None
     grids = [times, *(grid for grid in refinement(knots, len(times)) if len(grid) > len(times))]
     starts = _optimise_starts(problem, times, options, motions, batch, context)
     chosen = basins(problem, times, starts, options.same_path).optima
     problem, _, refined = _to_the_end(problem, grids, options, chosen, batch, context)
     good = [optimum for optimum in refined if _good(optimum)]
+    if lazy and good:
+        problem = replace(given, times=problem.times)
+        good = [optimum for optimum in apart(problem, good, options, context) if _good(optimum)]
+        if not good:
+            return finish(given, times, motions, options, context, lazy=False)
     return problem.times, basins(problem, problem.times, good, options.same_path).optima
 
 
@@ -189,8 +205,9 @@ def refuses(problem: Problem, options: GlobalOptions) -> str | None:
         return why
     if "dynamic_programming" not in options.generators:
         return None
-    why, words = dynamic_programming.dynamic_programming.why_not(rough(problem)), ", ".join(options.generators)
-    return why and f"method.global.starts = {words}: {why}; starts = roadmap serves every problem"
+    why, words = ALONG_LOOPS.why_not(rough(problem)), ", ".join(options.generators)
+    said = f"method.global.starts = {words}: dynamic_programming: {why}; starts = roadmap serves every problem"
+    return why and said
 
 
 global_planner = Method("global", "Planner's optimum", "#2F855A", GlobalOptions, WITH_TIMING, solve, refuses)
