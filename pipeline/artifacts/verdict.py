@@ -95,13 +95,17 @@ def _reasons(report: Report, e: Evaluation) -> str:
     parts.append(f"path error {e.tracking_error_between:.1g} m")
     if e.orientation_error_between > 0:
         parts[-1] += f" and {e.orientation_error_between:.1g} rad"
-    unchecked = ["self-collision"]
+    own = e.near.own
+    if np.isfinite(own.bound):
+        parts.append(f"clear of itself by {1000 * own.bound:.3g} mm ({own.first} and {own.second})")
+    unchecked = [] if problem.own is not None and not problem.own.unknown else ["self-collision"]
     if problem.obstacles is None:
         unchecked.append("obstacles (none given)")
     if not problem.bounds.any:
         unchecked.append("limits (none given)")
     known = _confirmed(report, e)
-    return "; ".join(filter(None, [", ".join(parts), known, f"not checked: {', '.join(unchecked)}"]))
+    left = f"not checked: {', '.join(unchecked)}" if unchecked else ""
+    return "; ".join(filter(None, [", ".join(parts), known, left]))
 
 
 def _against(report: Report, e: Evaluation) -> str:

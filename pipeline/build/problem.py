@@ -6,6 +6,7 @@ import numpy as np
 
 from pipeline.build import base
 from pipeline.build.checks import check_problem, require_reach
+from pipeline.build.collision import make_own, require_free_path
 from pipeline.build.goal import make_limits, make_objective, make_obstacles
 from pipeline.build.path import make_knots, make_reference, make_task
 from pipeline.build.rest import check_rest, ends_at_rest, unless_unlimited
@@ -39,6 +40,7 @@ def prepare(config: RunConfig) -> Problem:
         limits=make_limits(config.limits, arm, config.robot.limits if any(rest) else None),
         boundary=Boundary(config.boundary.kind),
         obstacles=make_obstacles(config.obstacles, arm),
+        own=make_own(config.collision, arm, robot.srdf),
         rest=rest,
         zero_acceleration=config.boundary.zero_acceleration,
         free_law=free_law,
@@ -48,6 +50,7 @@ def prepare(config: RunConfig) -> Problem:
     check_problem(problem, moved=not np.array_equal(given, q_init))
     if config.base.kind == "fixed":
         require_reach(problem)
+        require_free_path(problem)
     check_rest(problem)
     check_tool(problem)
     return base.place(problem, config)

@@ -14,7 +14,7 @@ from pipeline.config.fields import Name, Number, Switch, Text, Whole, WordOrVect
 from pipeline.config.goal import BoundaryConfig, KineticEnergyConfig, LimitsConfig, ObjectiveConfig
 from pipeline.config.methods import MethodConfig, MethodName
 from pipeline.config.path import CircleConfig, LineConfig, TimingConfig, WaypointsConfig
-from pipeline.config.robot import FixedBaseConfig, FreeBaseConfig, ObstaclesConfig, RobotConfig
+from pipeline.config.robot import CollisionConfig, FixedBaseConfig, FreeBaseConfig, ObstaclesConfig, RobotConfig
 from pipeline.config.steps import refuse_endless, refuse_endless_search
 from pipeline.config.studies import (
     CandidateStudyConfig,
@@ -102,6 +102,7 @@ class RunConfig:
     limits: LimitsConfig = LimitsConfig()
     boundary: BoundaryConfig = BoundaryConfig()
     obstacles: ObstaclesConfig = ObstaclesConfig()
+    collision: CollisionConfig = CollisionConfig()
     method: MethodConfig = MethodConfig()
     parallel: ParallelConfig = ParallelConfig()
     sweep: SweepConfig = SweepConfig()

@@ -173,7 +173,7 @@ def resample(problem: Problem, evaluation: Evaluation, rate: float) -> Resampled
     knots = evaluation.time
     fine = np.interp(np.arange(BETWEEN * (len(knots) - 1) + 1) / BETWEEN, np.arange(len(knots)), knots)
     judged = np.union1d(time, fine)  # a slow rate must not hide what happens between its samples
-    checked = audit(problem, judged, everything(judged), *(everything(judged, order) for order in (1, 2, 3)))
+    checked = audit(problem, everything, knots, judged)
     names = problem.task.arm.description.joints
     worst = {kind: (float(judged[row]), names[joint]) for kind, (row, joint) in checked.worst.items()}
     return Resampled(
@@ -212,7 +212,7 @@ def _faults(
     for kind, excess in checked.limit_excess.items():
         if excess > TOLERANCE:
             time, joint_name = worst[kind]
-            whose = f" of {joint_name}" if kind != "clearance" else ""
+            whose = "" if kind.endswith("clearance") else f" of {joint_name}"
             faults.append(f"exceeds the {kind} limit{whose} by {100 * excess:.3g} % at t = {time:.3g} s")
     for error, allowed, unit, key in (
         (checked.tracking_error, reference.tolerance, "m", "tolerance"),

@@ -125,17 +125,26 @@ def test_the_pictures_and_facts_are_there(case: Case, tmp_path: Path) -> None:
     assert component(file, "/__properties", "RecordingInfo:name") == ["line"]
 
 
+def tetrahedron(file: Path) -> Path:
+    """An OBJ file with four corners."""
+    corners = "v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nv 0 0 0.1\n"
+    file.write_text(f"{corners}f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n", encoding="utf-8")
+    return file
+
+
 def test_obstacles_are_drawn(case: Case, tmp_path: Path) -> None:
     """As solids, and in the view from above as outlines."""
     solids = (
         Shape("ball", "sphere", (0.05,), (0.3, 0.2, 0.1)),
         Shape("box", "box", (0.1, 0.2, 0.3), (0.3, 0.2, 0.1)),
         capsule("rod", np.array([0.1, 0.2, 0.0]), np.array([0.3, 0.2, 0.4]), 0.03),
+        Shape("can", "cylinder", (0.05, 0.2), (0.3, 0.2, 0.1)),
+        Shape("hull", "mesh", (1.0, 1.0, 1.0), (0.3, 0.2, 0.1), file=str(tetrahedron(tmp_path / "hull.obj"))),
     )
     problem, evaluations = case
     file = tmp_path / "run.rrd"
     write(file, dataclasses.replace(problem, obstacles=Obstacles(solids, 0.02)), evaluations)
-    for name in ("ball", "box", "rod"):
+    for name in ("ball", "box", "rod", "can", "hull"):
         assert {f"/obstacles/{name}", f"/planar/obstacles/{name}"} <= entities(file)
     (outline,) = component(file, "/planar/obstacles/box", "LineStrips2D:strips")
     assert np.ptp(outline, axis=0) == pytest.approx([0.1, 0.2], abs=1e-6)

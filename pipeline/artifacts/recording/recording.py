@@ -16,9 +16,10 @@ import numpy as np
 import pyarrow as pa
 import rerun as rr
 from rerun.chunk import RrdReader
+from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
-from pipeline.artifacts.figures.solids import outline
+from pipeline.artifacts.figures.solids import outline, surface
 from pipeline.artifacts.recording import blueprint, bounds
 from pipeline.artifacts.recording.arm import columns, draw_arm
 from pipeline.artifacts.recording.blueprint import faded, pixels, rgba, slug
@@ -301,6 +302,13 @@ def send_obstacles(recording: Any, shapes: Sequence[Shape], planar: bool) -> Non
             solid: Any = rr.Capsules3D(
                 lengths=[length], radii=[radius], translations=[shape.position - axis], **place, **common
             )
+        elif shape.kind == "cylinder":
+            sizes = {"lengths": [shape.size[1]], "radii": [shape.size[0]]}
+            solid = rr.Cylinders3D(**sizes, centers=[shape.position], **place, **common)
+        elif shape.kind == "mesh":
+            points = surface(shape)
+            faces = ConvexHull(points).simplices
+            solid = rr.Mesh3D(vertex_positions=points, triangle_indices=faces, albedo_factor=OBSTACLE)
         elif shape.kind == "sphere":
             solid = rr.Ellipsoids3D(radii=[shape.size[0]], centers=[shape.position], **common)
         else:

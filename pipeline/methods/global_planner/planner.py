@@ -15,6 +15,7 @@ from scipy.interpolate import CubicSpline
 
 from pipeline.common.arrays import Array
 from pipeline.config.methods import GlobalOptions
+from pipeline.methods.global_planner.apart import apart, keeps_own, without_own
 from pipeline.methods.global_planner.basins import Basins, basins, ceiling
 from pipeline.methods.global_planner.batch import JUMPS, Batch
 from pipeline.methods.global_planner.grids import coarsest, finer, on_knots, refinement
@@ -71,9 +72,14 @@ def solve(problem: Problem, options: GlobalOptions, context: Context) -> list[So
     return smooth(problem, found, options, context)
 
 
-def by_differences(problem: Problem, options: GlobalOptions, context: Context) -> list[Solution]:
-    """The same on the knots alone, as the papers have it."""
-    why = Batch.without(problem, options)
+def by_differences(problem: Problem, options: GlobalOptions, context: Context, lazy: bool = True) -> list[Solution]:
+    """The same on the knots alone, as the papers have it.
+
+    lazy: of the arm itself only the starts keep clear; of the optima those that come too near to it are solved again,
+    and where none of them is left, all is.
+    """
+    given, lazy = problem, lazy and keeps_own(problem)
+    why = Batch.without(without_own(problem) if lazy else problem, options)
     times, too_coarse = on_knots(problem, options.refine_to)
     if too_coarse:
         return [nothing(problem, Status.NOT_CONVERGED, too_coarse, {})]
@@ -82,6 +88,8 @@ def by_differences(problem: Problem, options: GlobalOptions, context: Context) -
     context.phase("drawing starts")
     drawn = Starts(problem, grids[0], options, np.random.default_rng(context.seed))
     motions, log = drawn.first, drawn.log
+    if lazy:
+        problem = without_own(problem)
     if not len(motions):
         return [nothing(problem, Status.INFEASIBLE, no_start(problem, log.get("drawn", 0)), log)]
 
@@ -120,6 +128,12 @@ def by_differences(problem: Problem, options: GlobalOptions, context: Context) -
         best = min((fine.cost for fine, _ in found), default=np.inf)
         sent = [pair for pair in found if pair[0].cost == best or finer(problem, MOST, [pair[0].q]) is None]
         log["optima_off_path"], found = len(found) - len(sent), sent
+    clear = apart(replace(given, times=problem.times), [fine for fine, _ in found], options, context) if lazy else []
+    if lazy and found:
+        found = [(fine, members) for fine, (_, members) in zip(clear, found, strict=True) if _good(fine)]
+        if not found:
+            return by_differences(given, options, context, lazy=False)
+        problem = replace(given, times=problem.times)
     log["jumping_optima"] = coarse.jumping + sum(fine.converged and not fine.continuous for fine in refined)
     if not found:
         why_not = no_optimum(problem, grids[0], starts, refined, coarse.jumping)
@@ -152,6 +166,7 @@ def as_solution(problem: Problem, optimum: Optimum, options: GlobalOptions) -> S
         Status.SOLVED,
         tracking_tolerance=TRACKING,
         limits_kept=LIMIT_KINDS,
+        clear_between=options.refine_to is not None,
         knots_only=options.refine_to is None,
         evidence=optimum.evidence,
         statistics={"solves": optimum.solves},
