@@ -47,6 +47,7 @@ def test_what_the_file_says(tmp_path: Path) -> None:
         ("fixed", "hand", "camera", "0 0 1"),
         ("fixed", "hand", "gripper_tcp", "0 0 1"),
         ("fixed", "hand", "cover", "0 0 1"),
+        ("fixed", "hand", "third_finger_tip", "0 0 1"),
     )
     found = said(file)
     assert (found["name"], found["end_effector"], found["task"]) == ('"my_arm"', '"gripper_tcp"', "[x,y,z]")
