@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pipeline.build import base
+from pipeline.build.anywhere import from_anywhere
 from pipeline.build.checks import check_problem, require_reach
 from pipeline.build.goal import make_limits, make_objective, make_obstacles
 from pipeline.build.path import make_knots, make_reference, make_task
@@ -23,7 +24,7 @@ def prepare(config: RunConfig) -> Problem:
         require_held_within(arm.description)
     task = make_task(robot, arm)
     q_init = initial(robot, arm)
-    reference, q_init = make_reference(config.path, config.timing, task, q_init)
+    reference, q_init, in_world = make_reference(config.path, config.timing, task, q_init)
     if config.timing.law == "from_file":
         refuse_endless(config, reference.duration, "path.file, which takes ")
     free_law, free_duration = config.timing.law == "optimal", config.timing.duration == "shortest"
@@ -42,6 +43,8 @@ def prepare(config: RunConfig) -> Problem:
         free_law=free_law,
         free_duration=free_duration,
     )
+    if robot.q_init is None and in_world:
+        problem = from_anywhere(problem)
     problem = unless_unlimited(config, problem)
     check_problem(problem)
     if config.base.kind == "fixed":

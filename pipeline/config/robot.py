@@ -80,7 +80,13 @@ class RobotConfig:
         dict[str, tuple[Shape, ...]] | None,
         Field(description="{link: [{kind: sphere, box or capsule, ...}, ...]}; null: the primitive shapes of the file"),
     ] = None
-    q_init: Annotated[Positions | None, Field(description="[rad] initial configuration, base to tip")] = (
+    q_init: Annotated[
+        Positions | None,
+        Field(
+            description="[rad] initial configuration, base to tip; null: of a path that says where in the world it is, "
+            "the best one, sought in the whole joint space; of others the middle of the joints' ranges"
+        ),
+    ] = (
         0.0,
         0.327,
         -0.754,
