@@ -108,13 +108,17 @@ def _reasons(report: Report, e: Evaluation) -> str:
     parts.append(f"path error {e.tracking_error_between:.1g} m")
     if e.orientation_error_between > 0:
         parts[-1] += f" and {e.orientation_error_between:.1g} rad"
-    unchecked = ["self-collision"]
+    own = e.near.own
+    if np.isfinite(own.bound):
+        parts.append(f"clear of itself by {1000 * own.bound:.3g} mm ({own.first} and {own.second})")
+    unchecked = [] if problem.own is not None and not problem.own.unknown else ["self-collision"]
     if problem.obstacles is None:
         unchecked.append("obstacles (none given)")
     if not problem.bounds.any:
         unchecked.append("limits (none given)")
     known = _confirmed(report, e)
-    return "; ".join(filter(None, [", ".join(parts), known, f"not checked: {', '.join(unchecked)}"]))
+    left = f"not checked: {', '.join(unchecked)}" if unchecked else ""
+    return "; ".join(filter(None, [", ".join(parts), known, left]))
 
 
 def _against(report: Report, e: Evaluation) -> str:
@@ -145,11 +149,8 @@ def _confirmed(report: Report, e: Evaluation) -> str:
     said = ["confirmed by IPOPT"] if "confirmed by IPOPT" in e.solution.evidence else []
     estimate = report.find(Estimate)
     for one in estimate.comparisons if estimate is not None and e.method == "global" else ():
-        other = report.motions.best(one.method)
-        if other is not None:
-            said.append(
-                f"{METHODS[one.method].title.lower()} within {100 * abs(other.objective / e.objective - 1):.2g} %"
-            )
+        if one.same_as == e.solution.optimum and not one.gone_on:
+            said.append(f"{one.method.replace('_', ' ')} leads there too")
     return ", ".join(said)
 
 

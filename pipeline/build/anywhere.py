@@ -36,7 +36,7 @@ def _one(problem: Problem) -> Array:
     q, error = project(problem.task, drawn, np.tile(start, (DRAWN, 1)), tolerance=1e-10)
     q = q[(error <= 1e-10) & (q >= bounds.lower).all(axis=1) & (q <= bounds.upper).all(axis=1)]
     q = q[np.argsort((((q - (low + high) / 2) / (high - low)) ** 2).sum(axis=1))]
-    if problem.obstacles is not None and len(q):
+    if problem.keeps_clear and len(q):
         q = q[:CLEAR]
-        q = q[Clearance(arm, problem.obstacles).smallest(q) >= problem.obstacles.margin]
+        q = q[Clearance(arm, problem.obstacles, problem.own).clear(q)]
     return np.asarray(q[0]) if len(q) else problem.q_init

@@ -27,6 +27,7 @@ from pipeline.path.waypoints import Waypoints, read, same_point
 from pipeline.robot.packages import find
 
 UNITS = {"m": 1.0, "mm": 1e-3}
+FAR = 50  # times the arm's length between way-points: no mistake but that of the unit
 NEGLIGIBLE = 1e-9  # of the length: a departure from the polygon below it is rounding
 
 TIMINGS: dict[str, Callable[[float], Timing]] = {
@@ -99,6 +100,7 @@ def make_reference(path: Any, timing: TimingConfig, task: Task, q_init: Array) -
         rows = _read(path, timing, task)
         given_points = rows.points * UNITS[path.units]
         points = given_points + here[:count] - given_points[0] if path.relative else given_points
+        _refuse_millimetres(path, given_points, task.arm)
         blend = path.blend if path.corners == "blend" else None
         ends = [*rows.begins[1:], len(points)]
         paths = [
@@ -130,6 +132,17 @@ def make_reference(path: Any, timing: TimingConfig, task: Task, q_init: Array) -
         q_init = place(task, q_init, start[0])
     tolerances = path.tolerance, path.orientation_tolerance
     return Reference(geometry, law, orientation, *tolerances, notes, path.exact, breaks), q_init, in_world
+
+
+def _refuse_millimetres(path: WaypointsConfig, points: Array, arm: Arm) -> None:
+    """Raise PathError for way-points [m] that are hundreds of times as far apart as the arm can reach."""
+    somewhere = np.random.default_rng(0).uniform(-np.pi, np.pi, (64, arm.n))
+    room, extent = np.ptp(arm.position(somewhere), axis=0).max(), float(np.ptp(points, axis=0).max())
+    if extent > FAR * room:
+        raise PathError(
+            f"path.file = {path.file}: its points are up to {extent:.4g} m apart, and the arm spans {room:.2g} m; "
+            "are they in mm? path.units=mm"
+        )
 
 
 def _curve(path: Any, task: Task, here: Array) -> Geometry:

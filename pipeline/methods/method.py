@@ -104,6 +104,7 @@ def _contradiction(problem: Problem) -> str | None:
 ANY = Serves()
 WITH_TIMING = Serves(timing=True, tube=True)
 ON_KNOTS = Serves(rest=False)  # by differences, which know no rest
+ALONG_LOOPS = Serves(redundancy=1, order=1, moving_base=False, rest=False)  # of the self-motion of an arm that stands
 
 
 @dataclass(frozen=True)

@@ -52,6 +52,7 @@ class Solution:
     `tracking_tolerance` [m] is what the method promises to keep of the path at its knots, `until` a time [s] from which
     on a singular motion is not to be used; the evaluation checks it.
     `limits_kept` are the kinds of limits that it promises to keep at its knots.
+    `clear_between`: of those, clearances are promised along the whole curve.
     `knots_only`: it goes from node to node of a grid, and promises nothing of the path between its knots.
     `grid` is the key of the configuration that its knots come from.
     `stretch` [m]: the part of the path that it follows, if not all; `approach`: the motion through joint space from
@@ -70,6 +71,7 @@ class Solution:
     tracking_tolerance: float = np.inf
     until: float = np.inf
     limits_kept: tuple[str, ...] = ()
+    clear_between: bool = False
     found: bool = True
     knots_only: bool = False
     grid: str = "timing.steps"

@@ -50,7 +50,7 @@ def study(motions: Motions) -> Pieces | None:
     if not found:
         return None
     problem = motions.problem
-    clearance = Clearance(problem.task.arm, problem.obstacles)
+    clearance = Clearance(problem.task.arm, problem.obstacles, problem.own)
     rows: list[dict[str, Any]] = []
     for e in found:
         assert e.solution.stretch is not None
@@ -63,13 +63,17 @@ def study(motions: Motions) -> Pieces | None:
                 "time_s": float(e.time[-1]),
                 "objective": e.objective,
                 "transit_s": float("nan") if approach is None else float(approach.time[-1]),
-                "transit_clearance_m": float("nan") if approach is None else float(clearance(approach.q).min()),
+                **{
+                    name: float("nan") if approach is None else float(clearance.smallest(pairs, approach.q).min())
+                    for name, pairs in (
+                        ("transit_clearance_m", clearance.obstacles),
+                        ("transit_own_clearance_m", clearance.own),
+                    )
+                    if pairs
+                },
             }
         )
-    table = pd.DataFrame(rows)
-    if problem.obstacles is None:
-        table = table.drop(columns="transit_clearance_m")
-    return Pieces(table, program(found, problem.task.arm.description.actuated))
+    return Pieces(pd.DataFrame(rows), program(found, problem.task.arm.description.actuated))
 
 
 def program(found: Sequence[Evaluation], joints: Sequence[str]) -> pd.DataFrame:

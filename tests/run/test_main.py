@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -214,5 +215,6 @@ def test_a_table_that_is_given_whole_names_the_entry_that_is_not_known(
 
 def test_mp4_needs_ffmpeg(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(shutil, "which", lambda name: None)
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
     answer = run("methods=[lsv]", "timing.steps=4", "artifacts.animation=mp4")
-    assert_refused(answer, "artifacts.animation = mp4: needs the program ffmpeg; gif needs none")
+    assert_refused(answer, "artifacts.animation = mp4: needs ffmpeg: pip install '.[film]'; gif needs none")

@@ -15,7 +15,7 @@ from scipy.interpolate import CubicSpline
 
 from pipeline.common.arrays import Array
 from pipeline.config.methods import GlobalOptions
-from pipeline.methods import dynamic_programming
+from pipeline.methods.global_planner.apart import apart, keeps_own, without_own
 from pipeline.methods.global_planner.basins import Basins, basins, ceiling
 from pipeline.methods.global_planner.batch import JUMPS, Batch
 from pipeline.methods.global_planner.grids import coarsest, finer, on_knots, refinement, served
@@ -26,7 +26,7 @@ from pipeline.methods.global_planner.smooth import freer, nothing, rough, smooth
 from pipeline.methods.global_planner.starts import Known, Starts
 from pipeline.methods.global_planner.timed import timed
 from pipeline.methods.global_planner.tube import exactly, loosened
-from pipeline.methods.method import WITH_TIMING, Context, Method
+from pipeline.methods.method import ALONG_LOOPS, WITH_TIMING, Context, Method
 from pipeline.model.kinematics import wrap
 from pipeline.problem.limits import LIMIT_KINDS
 from pipeline.problem.problem import Problem
@@ -77,10 +77,15 @@ def solve(problem: Problem, options: GlobalOptions, context: Context, known: Kno
 
 
 def by_differences(
-    problem: Problem, options: GlobalOptions, context: Context, known: Known | None = None
+    problem: Problem, options: GlobalOptions, context: Context, known: Known | None = None, lazy: bool = True
 ) -> list[Solution]:
-    """The same on the knots alone, as the papers have it."""
-    why = Batch.without(problem, options)
+    """The same on the knots alone, as the papers have it.
+
+    lazy: of the arm itself only the starts keep clear; of the optima those that come too near to it are solved again,
+    and where none of them is left, all is.
+    """
+    given, lazy = problem, lazy and keeps_own(problem)
+    why = Batch.without(without_own(problem) if lazy else problem, options)
     times, too_coarse = on_knots(problem, options.refine_to)
     if too_coarse:
         return [nothing(problem, Status.NOT_CONVERGED, too_coarse, {})]
@@ -90,6 +95,8 @@ def by_differences(
     context.phase("drawing starts")
     drawn = Starts(problem, grids[0], options, np.random.default_rng(context.seed), known)
     motions, log = drawn.first, drawn.log
+    if lazy:
+        problem = without_own(problem)
     if not len(motions):
         return [nothing(problem, Status.INFEASIBLE, no_start(problem, log.get("drawn", 0)), log)]
 
@@ -121,10 +128,10 @@ def by_differences(
     ]
     log["barren_starts"] = coarse.barren
     context.phase("refining and confirming")
-    given, grids_given, refined = problem, grids, list[Optimum]()
+    before, refined = (problem, grids), list[Optimum]()
     while len(refined) < len(coarse.optima) and not any(map(_good, refined)):
-        lot = coarse.optima[len(refined) : len(refined) + served(given)]
-        problem, grids, fine_ones = _to_the_end(given, grids_given, options, lot, batch, context)
+        lot = coarse.optima[len(refined) : len(refined) + served(before[0])]
+        problem, grids, fine_ones = _to_the_end(*before, options, lot, batch, context)
         refined += fine_ones
     log["grids"] = [len(grid) - 1 for grid in grids]
     log["optima_left_coarse"] = left = len(coarse.optima) - len(refined)
@@ -133,6 +140,12 @@ def by_differences(
         best = min((fine.cost for fine, _ in found), default=np.inf)
         sent = [pair for pair in found if pair[0].cost == best or finer(problem, MOST, [pair[0].q]) is None]
         log["optima_off_path"], found = len(found) - len(sent), sent
+    clear = apart(replace(given, times=problem.times), [fine for fine, _ in found], options, context) if lazy else []
+    if lazy and found:
+        found = [(fine, members) for fine, (_, members) in zip(clear, found, strict=True) if _good(fine)]
+        if not found:
+            return by_differences(given, options, context, known, lazy=False)
+        problem = replace(given, times=problem.times)
     log["jumping_optima"] = coarse.jumping + sum(fine.converged and not fine.continuous for fine in refined)
     if not found:
         why_not = no_optimum(problem, grids[0], starts, refined, coarse.jumping)
@@ -143,22 +156,33 @@ def by_differences(
     solutions = []
     for rank, (fine, moved) in enumerate(ranked):
         said = _said(problem, asked, options, [fine.q]) if rank == 0 else ""
-        own = {"starts_in_basin": members[id(fine)], "solves": fine.solves}
+        own = {"starts_in_basin": members[id(fine)], **(log if rank == 0 else {})}
+        solution = as_solution(problem, fine, options)
         solutions.append(
-            Solution(
-                "global",
-                Trajectory(problem.times, fine.q),
-                Status.SOLVED,
-                "; ".join(filter(None, (said, moved))),
+            replace(
+                solution,
+                message="; ".join(filter(None, (said, moved))),
                 optimum=rank + 1,
-                tracking_tolerance=TRACKING,
-                limits_kept=LIMIT_KINDS,
-                knots_only=options.refine_to is None,
-                evidence=(words if rank == 0 else "") + fine.evidence,
-                statistics={**(log if rank == 0 else {}), **own},
+                evidence=(words if rank == 0 else "") + solution.evidence,
+                statistics={**own, **solution.statistics},
             )
         )
     return solutions
+
+
+def as_solution(problem: Problem, optimum: Optimum, options: GlobalOptions) -> Solution:
+    """An optimum on the knots of the problem as an answer of the planner."""
+    return Solution(
+        "global",
+        Trajectory(problem.times, optimum.q),
+        Status.SOLVED,
+        tracking_tolerance=TRACKING,
+        limits_kept=LIMIT_KINDS,
+        clear_between=options.refine_to is not None,
+        knots_only=options.refine_to is None,
+        evidence=optimum.evidence,
+        statistics={"solves": optimum.solves},
+    )
 
 
 def finish(
@@ -186,8 +210,9 @@ def refuses(problem: Problem, options: GlobalOptions) -> str | None:
         return why
     if "dynamic_programming" not in options.generators:
         return None
-    why, words = dynamic_programming.dynamic_programming.why_not(rough(problem)), ", ".join(options.generators)
-    return why and f"method.global.starts = {words}: {why}; starts = roadmap serves every problem"
+    why, words = ALONG_LOOPS.why_not(rough(problem)), ", ".join(options.generators)
+    said = f"method.global.starts = {words}: dynamic_programming: {why}; starts = roadmap serves every problem"
+    return why and said
 
 
 global_planner = Method("global", "Planner's optimum", "#2F855A", GlobalOptions, WITH_TIMING, solve, refuses)

@@ -13,6 +13,7 @@ from scipy.interpolate import CubicSpline
 
 from pipeline.common.arrays import Array
 from pipeline.config.methods import GlobalOptions
+from pipeline.methods.global_planner.apart import keeps_own, short, without_own
 from pipeline.methods.global_planner.grids import finer, off_path, served
 from pipeline.methods.global_planner.optimum import confirmed
 from pipeline.methods.global_planner.reasons import counted
@@ -215,8 +216,18 @@ def promised(problem: Problem) -> float:
 
 
 def refine(context: tuple[Problem, GlobalOptions], motion: Array) -> Smooth:
-    """The spline that is nearest to an optimum by differences: coarse to fine where torques count."""
+    """The spline that is nearest to an optimum by differences. Where it comes too near to the arm itself, and nowhere
+    else, the rows that keep it off come in: few do, and they cost what all else costs.
+    """
     problem, options = context
+    free = _refine(without_own(problem), options, motion)
+    if not keeps_own(problem) or not free.converged or short(problem, free.curve) <= 0:
+        return free
+    return _refine(problem, options, free.curve(problem.times))
+
+
+def _refine(problem: Problem, options: GlobalOptions, motion: Array) -> Smooth:
+    """Coarse to fine where torques count."""
     guess = Curve.through(problem, problem.times, motion)
     served = not problem.objective.second_order and keeps_forces(problem, guess)
     solver, finer = Searches(options), [problem.times] if served else grids(problem)
@@ -232,7 +243,7 @@ def refine(context: tuple[Problem, GlobalOptions], motion: Array) -> Smooth:
             guess = Curve.through(problem, grid, solved.curve(grid), solved.curve.ends)
             solved = solver.lazily(problem, guess) if loose else solver.whole(problem, guess)
     if solved.outcome.converged:
-        solved, further = tighten(problem, solved, **solver.given)
+        solved, further = tighten(problem, solved, short, **solver.given)
         for one in further:
             solver.note(one)
     if solved.outcome.converged:

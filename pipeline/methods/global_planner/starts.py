@@ -15,8 +15,8 @@ from scipy.interpolate import CubicSpline
 
 from pipeline.common.arrays import Array
 from pipeline.config.methods import GlobalOptions
-from pipeline.methods import dynamic_programming
 from pipeline.problem.problem import Problem
+from pipeline.search import bellman
 from pipeline.search.configurations import starting_points
 from pipeline.search.population import population, ranking
 from pipeline.search.roadmap import Roadmap
@@ -92,7 +92,7 @@ def _population(starts: Starts) -> tuple[Array, Further]:
 
 def _dynamic_programming(starts: Starts) -> tuple[Array, Further]:
     """One for each valley that the grid shows: there are no others."""
-    paths = dynamic_programming.starts(starts.problem, starts.grid)
+    paths = bellman.starts(starts.problem, starts.grid)
     starts.log["dynamic_programming_paths"] = len(paths)
     return paths.reshape(-1, *starts.none().shape[1:]), starts.none
 

@@ -32,9 +32,10 @@ class Transits:
     """Transits of one problem."""
 
     def __init__(self, problem: Problem, rng: np.random.Generator) -> None:
-        kept = problem.obstacles and replace(problem.obstacles, margin=ROOM * problem.obstacles.margin)
+        obstacles = problem.obstacles and replace(problem.obstacles, margin=ROOM * problem.obstacles.margin)
+        own = problem.own and replace(problem.own, margin=ROOM * problem.own.margin)
         self.problem, self.rng = problem, rng
-        self.manifold = Manifold(replace(problem, obstacles=kept))
+        self.manifold = Manifold(replace(problem, obstacles=obstacles, own=own))
 
     def __call__(self, start: Array, end: Array) -> Trajectory | None:
         """From the configuration `start` (n,) to `end` (n,); None: no way was found."""
