@@ -6,6 +6,7 @@ It knows none of its terms (`terms/`); `transcription.py` puts them together and
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
+from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
@@ -18,10 +19,11 @@ from pipeline.problem.lagrangian import Lagrangian
 from pipeline.problem.problem import Boundary, Problem
 from pipeline.program import ipopt
 from pipeline.program.differentiable import DifferentiableConstraint, DifferentiableCost
+from pipeline.program.residuals import Conditions
 from pipeline.program.scaling import POSITION_SCALE, Guess, Scaling, Sums, lifted, scale
 
 KNOTS_PER_BINDING = 10  # a Python binding pays for its size squared: more, smaller bindings are cheaper up to a point
-POSITIONS_PER_BINDING = 20  # of knots whose positions alone it takes
+POSITIONS_PER_BINDING = 25  # of knots whose positions alone it takes
 
 
 Block = NDArray[np.int_]
@@ -119,6 +121,14 @@ class Lifted:
         outcome = ipopt.solve(self.drake, self.drake.initial_guess() if guess is None else guess, **options)
         # IPOPT linearises every row once per iteration: any of them can tell how many there were.
         return outcome, self._rows[0].iterations
+
+    def residuals(self, outcome: ipopt.Outcome) -> tuple[float, float]:
+        """Violation and optimality that IPOPT has left (`residuals.py`)."""
+        return self._conditions.residuals(outcome.result)
+
+    @cached_property
+    def _conditions(self) -> Conditions:
+        return Conditions(self.drake, self.functions)
 
     def read(self, outcome: ipopt.Outcome, unknowns: NDArray[Any]) -> Array:
         """The values of unknowns in an outcome, in their shape."""

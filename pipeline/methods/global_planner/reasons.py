@@ -19,10 +19,11 @@ OTHERS = "more starts (method.global.optimised) or other ones (method.global.sta
 REACHED = 1e-6  # [m, rad]
 
 
-def counted(optima: int, starts: int, barren: int) -> str:
-    """How many optima came of how many starts."""
+def counted(optima: int, starts: int, barren: int, left: int = 0) -> str:
+    """How many optima came of how many starts; `left` dearer ones were not carried to the long path's knots."""
     count = f"{optima} distinct optim{'um' if optima == 1 else 'a'} found from {starts} starts"
-    return f"{count}; the last {barren} starts brought nothing new; "
+    dearer = f"{left} dearer one{'s' if left > 1 else ''} of the coarse grid not refined; " if left else ""
+    return f"{count}; the last {barren} starts brought nothing new; {dearer}"
 
 
 def no_start(problem: Problem, drawn: int) -> str:

@@ -14,7 +14,6 @@ from pipeline.problem.lagrangian import trapezoid_weights
 from pipeline.problem.problem import Boundary, Problem
 from pipeline.program import ipopt
 from pipeline.program.program import Lifted
-from pipeline.program.residuals import residuals
 from pipeline.program.scaling import POSITION_SCALE, Sums, scale
 from pipeline.program.spline.curve import Curve, integrals, stations
 
@@ -90,7 +89,7 @@ class Solved:
 
     def residuals(self) -> tuple[float, float]:
         """Violation and optimality that IPOPT has left, see `residuals.py`."""
-        return residuals(self.program.drake, self.outcome.result)
+        return self.program.residuals(self.outcome)
 
 
 class Spline(Lifted):
