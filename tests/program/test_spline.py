@@ -310,6 +310,24 @@ def test_the_shortest_motion_leaves_no_room_and_exceeds_nothing(tight: tuple[Pro
     assert used == pytest.approx(1.0, abs=1e-5)
 
 
+def test_the_shortest_motion_that_was_lost_is_sought_again(
+    tight: tuple[Problem, Curve], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A first solve that is stopped at once, and then another one, to the end."""
+    program, stopped, run = transcribe(*tight, stretch=1.2), [], Spline.run
+
+    def first_stopped(self: Spline, **options: Any) -> Any:
+        outcome, iterations = run(self, **options, **({} if stopped else {"max_iterations": 1}))
+        stopped.append(outcome.status)
+        return outcome, iterations
+
+    monkeypatch.setattr(Spline, "run", first_stopped)
+    solved = program.solve()
+    assert stopped == ["max iteration exceeded", "success"]
+    assert solved.outcome.converged
+    assert 0.3 < solved.stretch < 1.0
+
+
 def test_tightened_limits_hold_at_the_knots(tight: tuple[Problem, Curve]) -> None:
     asked, free = tight
     whole = Tightened.none(asked, asked.times)

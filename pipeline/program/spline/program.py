@@ -28,9 +28,13 @@ SMALL_WITH_TORQUE = 3e-3
 EASY = {"spral_nemin": 1, "limited_memory_max_history": 4}
 
 
+# Of IPOPT where the shortest motion was lost: a barrier that may rise lets the time run off to many times itself.
+STEADY = {"mu_strategy": "monotone", "mu_init": 1e-4}
+
+
 # Of IPOPT in a tube: most knots touch its wall. A barrier that only falls does not send them to and fro, and one that
 # falls to 1e-11 leaves rounding errors of 1e-6 in the optimality for hundreds of iterations.
-TUBE = {"mu_strategy": "monotone", "mu_init": 1e-4, "mu_min": 1e-9, "acceptable_iter": 5}
+TUBE = {**STEADY, "mu_min": 1e-9, "acceptable_iter": 5}
 
 
 @dataclass(frozen=True)
@@ -146,6 +150,8 @@ class Spline(Lifted):
     def solve(self, **options: Any) -> Solved:
         """Solve from the guess."""
         outcome, iterations = self.run(extra=self._solver(), **options)
+        if self.stretch is not None and not outcome.converged:
+            outcome, iterations = self.run(extra=STEADY, **options)
         q, v, a = (self.read(outcome, unknowns) for unknowns in (self.y, self.v, self.a))
         curve = Curve(self.times, q / POSITION_SCALE, v / self.v_unit, a / self.a_unit)
         stretch = 1.0 if self.stretch is None else float(self.read(outcome, self.stretch)[0])
