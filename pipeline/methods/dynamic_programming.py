@@ -1,103 +1,79 @@
-"""Dynamic programming on a grid of the self-motion manifold (r = 1): the cheapest path through the grid's nodes.
+"""Dynamic programming on a grid of the self-motion manifold (r = 1): the cheapest paths through its nodes, finished.
 
-Every knot's manifold is sampled evenly in arc length (all loops: `self_motion.py`), and Bellman's recursion
-V_i(b) = min_a V_(i-1)(a) + 1/2 d' M(q_b) d / dt_i, with d = q_b - q_a the joint difference of one interval, runs over
-all pairs of nodes, so that it needs no assumption on how the manifold changes along the path (other terms of first
-order: `grid.py`). The sum is the kinetic-energy integral by backward differences (PMKE paper eq. (4), Global
-paper eq. (5)). Every path of the grid keeps the task at its knots and is feasible for the transcription on the same
-knots: the cost bounds that program's optimum from above. Its excess, the grid error, is of second order in the node
-spacing and can only be estimated here: cheaper motions may pass between the nodes (a bound: `lower_bound.py`).
+Every knot's manifold is sampled evenly in arc length (all loops: `self_motion.py`), and Bellman's recursion runs over
+all pairs of nodes of neighbouring knots (`bellman.py`). The sum is the kinetic-energy integral by backward differences
+(PMKE paper eq. (4), Global paper eq. (5); other terms of first order: `grid.py`). Every path of the grid keeps the task
+at its knots and is feasible for the transcription on the same knots: the cost bounds that program's optimum from above.
+Its excess, the grid error, is of second order in the node spacing and can only be estimated here: cheaper motions may
+pass between the nodes (a bound: `lower_bound.py`). A path from node to node is no motion yet: the planner's local
+solves make one of it on the knots of the problem, and what they lose on the way is not listed.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from pipeline.common.arrays import Array
-from pipeline.config.methods import DynamicProgrammingOptions
-from pipeline.methods.method import Context, Method, Serves
-from pipeline.model.kinematics import wrap
+from pipeline.config.methods import DynamicProgrammingOptions, GlobalOptions
+from pipeline.methods.global_planner.planner import TRACKING, finish
+from pipeline.methods.method import ALONG_LOOPS, Context, Method
 from pipeline.problem.costs import objective_values
-from pipeline.problem.problem import Boundary, Problem
+from pipeline.problem.limits import LIMIT_KINDS
+from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Solution, Status, Trajectory
 from pipeline.program.transcription import transcribe
-from pipeline.search.grid import Grid, Index, make_grid
-from pipeline.search.selection import distinct
-
-TRACKING = 1e-10  # [m] what every node keeps
-
-
-STRIDE = 8  # first spacing, in nodes, of the starts that a cyclic problem is solved from
+from pipeline.search.bellman import distinct_paths, paths
+from pipeline.search.grid import Grid, make_grid
 
 
 def solve(problem: Problem, options: DynamicProgrammingOptions, context: Context) -> list[Solution]:
-    """Distinct grid optima on the grid's own knots, best first; the first with an estimate of its grid error.
+    """The distinct optima to which the grid's paths lead, best first; in the statistics of the first the least cost on
+    the grid and an estimate of its error.
 
-    Torque and power limits are not part of a first-order grid: with them the costs are those of a relaxed problem.
+    Torque and power limits are not part of a first-order grid: with them its cost is that of a relaxed problem.
     """
     times = _intervals(problem, options.intervals)
     grid = make_grid(problem, times, options.nodes, options.velocity_slack)
     motions, costs = paths(grid, problem.boundary)
-    kept = _distinct(problem, motions, costs, options.same_path)
+    kept = distinct_paths(problem, motions, costs, options.same_path)
     if not kept:
-        standing = np.tile(problem.q_init, (len(times), 1))
         message = "no path through the grid keeps the limits; more nodes or fewer intervals make it finer than them"
-        return [Solution("dynamic_programming", Trajectory(times, standing), Status.INFEASIBLE, message, found=False)]
-    context.progress(1, 1, float(costs[kept[0]]))
-    log: dict[str, Any] = {**_errors(problem, grid, motions[kept[0]], float(costs[kept[0]]))}
-    log["spacing_rad"] = grid.spacing
-    log["loops"] = [len(layer.loops) for layer in grid.layers]
+        return [_nothing(problem, Status.INFEASIBLE, message, {})]
+    cost = float(costs[kept[0]])
+    log: dict[str, Any] = {"cost": cost, "intervals": len(times) - 1, "paths": len(kept), "spacing_rad": grid.spacing}
+    log |= {"loops": [len(layer.loops) for layer in grid.layers], **_errors(problem, grid, motions[kept[0]], cost)}
+    knots, optima = finish(problem, times, motions[kept], GlobalOptions(), context)
+    if not optima:
+        message = f"none of the grid's {len(kept)} paths leads to a motion on the problem's knots"
+        return [_nothing(problem, Status.NOT_CONVERGED, message, log)]
+    context.progress(1, 1, optima[0].cost)
     return [
         Solution(
             "dynamic_programming",
-            Trajectory(times, motions[index]),
+            Trajectory(knots, optimum.q),
             Status.SOLVED,
             optimum=rank + 1,
             tracking_tolerance=TRACKING,
-            knots_only=True,
-            grid="method.dynamic_programming.intervals",
-            limits_kept=("position", "velocity", "clearance"),
-            statistics={"cost": float(costs[index]), **(log if rank == 0 else {})},
+            limits_kept=LIMIT_KINDS,
+            clear_between=True,
+            evidence=optimum.evidence,
+            statistics={**(log if rank == 0 else {}), "solves": optimum.solves},
         )
-        for rank, index in enumerate(kept)
+        for rank, optimum in enumerate(optima)
     ]
 
 
 dynamic_programming = Method(
-    "dynamic_programming",
-    "Dynamic programming",
-    "#5A6472",
-    DynamicProgrammingOptions,
-    Serves(redundancy=1, order=1, moving_base=False, rest=False),
-    solve,
+    "dynamic_programming", "Dynamic programming", "#5A6472", DynamicProgrammingOptions, ALONG_LOOPS, solve
 )
 
 
-def starts(problem: Problem, times: Array, nodes: int = 180, same_path: float = 0.2) -> Array:
-    """Motions (K, N + 1, n) [rad] on the knots `times`, best first: one for each valley that the grid shows.
-
-    A velocity limit may be exceeded by one node spacing per step: the solver that starts here will keep it.
-    """
-    motions, costs = paths(make_grid(problem, times, nodes, velocity_slack=1.0), problem.boundary)
-    return motions[_distinct(problem, motions, costs, same_path)]
-
-
-def _distinct(problem: Problem, motions: Array, costs: Array, same_path: float) -> list[int]:
-    """Indices of distinct motions of finite cost, best first; shifted in place by full turns into the limits."""
-    revolute, bounds = problem.task.arm.description.revolute, problem.bounds
-    turns = np.where(revolute & np.isfinite(bounds.lower), 2 * np.pi, 0.0)
-    lowest = motions.min(axis=1) - bounds.lower
-    shift = np.where(turns > 0, np.floor((lowest + 1e-9) / (2 * np.pi)), 0.0)
-    motions -= (turns * shift)[:, None]
-    inside = np.all((motions <= bounds.upper + 1e-8) & (motions >= bounds.lower - 1e-8), axis=(1, 2))
-    if problem.boundary is Boundary.FIXED:
-        inside &= np.abs(motions[:, 0] - problem.q_init).max(axis=1, initial=0.0) < 1e-9
-    usable = np.flatnonzero(np.isfinite(costs) & inside)
-    return [int(usable[i]) for i in distinct(motions[usable], costs[usable], len(usable), same_path, revolute)]
+def _nothing(problem: Problem, status: Status, message: str, log: dict[str, Any]) -> Solution:
+    standing = Trajectory(problem.times, np.tile(problem.q_init, (len(problem.times), 1)))
+    return Solution("dynamic_programming", standing, status, message, statistics=log, found=False)
 
 
 def _errors(problem: Problem, grid: Grid, motion: Array, cost: float) -> dict[str, float]:
@@ -127,138 +103,3 @@ def _errors(problem: Problem, grid: Grid, motion: Array, cost: float) -> dict[st
 def _intervals(problem: Problem, intervals: int | None) -> Array:
     own = len(problem.times) - 1
     return np.interp(np.linspace(0, own, min(intervals or own, own) + 1), np.arange(own + 1), problem.times)
-
-
-# --- Bellman's recursion --------------------------------------------------------------------------------------------
-
-
-def forward(grid: Grid, start: Array) -> tuple[Array, list[Index]]:
-    """From values (K_0,) at the first knot: values (K_N,) at the last and the best predecessors of every interval."""
-    value = start
-    best: list[Index] = []
-    for i in range(len(grid.layers) - 1):
-        size = len(grid.layers[i + 1].q)
-        after, chosen = np.empty(size), np.empty(size, dtype=np.intp)
-        for rows, cost in grid.steps(i):
-            cost += value
-            chosen[rows] = cost.argmin(axis=1)
-            after[rows] = cost[np.arange(len(cost)), chosen[rows]]
-        value = after
-        best.append(chosen)
-    return value, best
-
-
-def backward(grid: Grid) -> tuple[Array, list[Index]]:
-    """The same from the end: least costs (K_0,) to go from the first knot, and the best successors."""
-    value = np.zeros(len(grid.layers[-1].q))
-    best: list[Index] = []
-    for i in range(len(grid.layers) - 2, -1, -1):
-        size = len(grid.layers[i].q)
-        before, chosen = np.full(size, np.inf), np.zeros(size, dtype=np.intp)
-        for rows, cost in grid.steps(i):
-            cost += value[rows, None]
-            row = cost.argmin(axis=0)
-            least = cost[row, np.arange(size)]
-            better = least < before
-            before[better], chosen[better] = least[better], row[better] + rows.start
-        value = before
-        best.insert(0, chosen)
-    return value, best
-
-
-def round_trips(grid: Grid, starts: Index) -> Array:
-    """Least costs (S,) of the closed paths through each of the nodes `starts` (S,) of the first and last knot."""
-    value = np.full((len(starts), len(grid.layers[0].q)), np.inf)
-    value[np.arange(len(starts)), starts] = 0.0
-    last = len(grid.layers) - 2
-    for i in range(last):
-        after = np.empty((len(starts), len(grid.layers[i + 1].q)))
-        for rows, cost in grid.steps(i):
-            for s in range(len(starts)):
-                after[s, rows] = (cost + value[s]).min(axis=1)
-        value = after
-    closing = np.concatenate([cost for _, cost in grid.steps(last, starts)])
-    return np.asarray((closing + value).min(axis=1))
-
-
-def minima(value: Array, loops: tuple[int, ...], reach: int = 1) -> Index:
-    """Nodes (P,) whose finite value is the least of all within `reach` nodes along their loop."""
-    out, first = [], 0
-    for size in loops:
-        part = value[first : first + size]
-        shifts = range(1, min(reach, size - 1) + 1)
-        least = np.isfinite(part)
-        for shift in shifts:
-            least &= (part <= np.roll(part, shift)) & (part < np.roll(part, -shift))
-        out.append(first + np.flatnonzero(least))
-        first += size
-    return np.concatenate(out)
-
-
-# --- paths ----------------------------------------------------------------------------------------------------------
-
-
-def paths(grid: Grid, boundary: Boundary) -> tuple[Array, Array]:
-    """Motions (P, N + 1, n) [rad] through the local minima of the value functions, and their costs (P,) [J s].
-
-    Fixed and free: the minima of the least cost to reach a node of the last knot and, as a second valley may end where
-    a better one does, of the least cost to go from a node of the first. Cyclic: of the closed paths by their start.
-    """
-    if boundary is Boundary.CYCLIC:
-        return _cyclic_paths(grid)
-    arrive, before = forward(grid, np.zeros(len(grid.layers[0].q)))
-    chosen = _backtrack(before, minima(arrive, grid.layers[-1].loops))
-    costs = arrive[chosen[:, -1]]
-    if boundary is Boundary.FREE:
-        leave, after = backward(grid)
-        nodes = [minima(leave, grid.layers[0].loops)]
-        for best in after:
-            nodes.append(best[nodes[-1]])
-        chosen = np.concatenate([chosen, np.stack(nodes, axis=1)])
-        costs = np.concatenate([costs, leave[nodes[0]]])
-    return _unwound(grid, chosen), costs
-
-
-def _cyclic_paths(grid: Grid) -> tuple[Array, Array]:
-    """Starts STRIDE nodes apart, then each local minimum of their costs refined by halving the distance."""
-    layer = grid.layers[0]
-    size = len(layer.q)
-    cost = np.full(size, np.inf)
-    first = np.arange(0, size, STRIDE)
-    cost[first] = round_trips(grid, first)
-    ends = np.cumsum((0, *layer.loops))
-    pieces = tuple(int(((first >= low) & (first < high)).sum()) for low, high in pairwise(ends))
-    best = first[minima(cost[first], pieces)]
-    low = ends[np.searchsorted(ends, best, side="right") - 1]
-    length = ends[np.searchsorted(ends, best, side="right")] - low
-    tried = np.isin(np.arange(size), first)
-    distance = STRIDE // 2
-    while distance:
-        around = low[:, None] + (best[:, None] - low[:, None] + np.array([-distance, 0, distance])) % length[:, None]
-        new = np.unique(around[~tried[around]])
-        if len(new):
-            cost[new], tried[new] = round_trips(grid, new), True
-        best = around[np.arange(len(best)), cost[around].argmin(axis=1)]
-        distance //= 2
-    chosen = []
-    for node in np.unique(best):
-        start = np.full(size, np.inf)
-        start[node] = 0.0
-        _, before = forward(grid, start)
-        chosen.append(_backtrack(before, np.array([node])))
-    nodes = np.concatenate(chosen) if chosen else np.empty((0, len(grid.layers)), dtype=np.intp)
-    return _unwound(grid, nodes), cost[nodes[:, 0]]
-
-
-def _backtrack(before: list[Index], last: Index) -> Index:
-    nodes = [last]
-    for best in reversed(before):
-        nodes.append(best[nodes[-1]])
-    return np.stack(nodes[::-1], axis=1)
-
-
-def _unwound(grid: Grid, nodes: Index) -> Array:
-    """Continuous joint motions (P, N + 1, n) through node numbers (P, N + 1)."""
-    q = np.stack([layer.q[column] for layer, column in zip(grid.layers, nodes.T, strict=True)], axis=1)
-    change = wrap(np.diff(q, axis=1), grid.turning)
-    return np.concatenate([q[:, :1], q[:, :1] + np.cumsum(change, axis=1)], axis=1)

@@ -1,10 +1,11 @@
-"""The methods of a run, one after the other."""
+"""The methods of a run, one after the other; the planner goes on from better motions than its own."""
 
 from __future__ import annotations
 
 import time
 
 from pipeline.config.run import RunConfig
+from pipeline.methods.global_planner.continued import continued
 from pipeline.methods.method import Context
 from pipeline.methods.registry import METHODS
 from pipeline.problem.problem import Problem
@@ -20,4 +21,4 @@ def solve(problem: Problem, config: RunConfig, context: Context) -> tuple[list[S
         begin = time.perf_counter()
         solutions += METHODS[name](problem, config.method.of(name), context)
         seconds[name] = time.perf_counter() - begin
-    return solutions, seconds
+    return continued(problem, solutions, config.method.of("global"), context), seconds

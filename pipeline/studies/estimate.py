@@ -1,69 +1,49 @@
 """Hold what dynamic programming or a bound's cells found on a coarse grid beside the planner's optima (r = 1).
 
-Their motions are finished by the planner's own way, grid by grid, on its knots. There paths are compared: whose motion
-it is, is a question of paths and not of costs. What the planner does not list stays theirs.
+There paths are compared: whose motion it is, is a question of paths and not of costs. Where theirs was better the
+planner has gone on from it before (`continued.py`), and that is said; what it does not list stays theirs.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from typing import Any, ClassVar
 
-import numpy as np
-import pandas as pd
-
-from pipeline.common.arrays import Array
 from pipeline.config.methods import GlobalOptions
-from pipeline.methods.global_planner.optimum import Optimum
-from pipeline.methods.global_planner.planner import finish
+from pipeline.methods.global_planner.continued import ON_GRIDS, cost, finished, of_same_path
 from pipeline.methods.method import Context
 from pipeline.methods.registry import METHODS
-from pipeline.problem.costs import objective_values
 from pipeline.problem.problem import Problem
-from pipeline.problem.solution import Solution, Status, Trajectory
-from pipeline.search.selection import path_distance
+from pipeline.problem.solution import Solution
 from pipeline.studies.study import Motions, Result
-
-ON_GRIDS = ("dynamic_programming", "lower_bound")
-CHEAPER = 1e-6  # relative: costs that differ by less are the same
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """What became of the motions of one method on its own grid of so many intervals.
+    """What became of the best motion of one method that works on a grid of so many intervals.
 
-    best: the planner's best cost on its `knots` intervals. same_as: the number of the planner's optimum that the
-    method's first motion is there, 0 if it is none of them. finished: the cost of that motion, NaN if it was lost on
-    the way. better: of its motions that the planner does not list and that cost less than its best, the cheapest.
+    best, finished: the objective of the planner's best and of that motion, in continuous time. same_as: which of the
+    planner's optima it is, 0 if it is none of them. gone_on: whether the planner has its best from this method.
     """
 
     method: str
     intervals: int
-    knots: int
     best: float
     finished: float
     same_as: int
-    better: float = float("nan")
-    motion: Trajectory | None = None
+    gone_on: bool
 
     @property
     def sentence(self) -> str:
         """For people."""
-        said = f"its best motion on {self.intervals} intervals, finished by the planner on {self.knots}, "
-        if np.isnan(self.finished):
-            said = f"its best motion on {self.intervals} intervals was lost on the way to {self.knots}"
-        elif self.same_as:
-            which = "best" if self.same_as == 1 else f"optimum {self.same_as}"
-            said += f"is the planner's {which}, {self.finished:.5g}"
-        else:
-            said += f"is none of the planner's: it costs {self.finished:.5g}, the planner's best {self.best:.5g}"
-        if self.motion is None:
-            return f"{said}; nothing cheaper than the planner's best came of its motions"
-        return (
-            f"{said}; a better motion than the planner's best ({self.best:.5g}) came of its motions: "
-            f"{self.better:.5g}, see better_than_planner_{self.method}.csv"
-        )
+        said = f"its best motion on {self.intervals} intervals, finished by the planner, "
+        if not self.same_as:
+            costs = f"it costs {self.finished:.5g} in continuous time, the planner's best {self.best:.5g}"
+            return f"{said}is none of the planner's: {costs}"
+        which = "best" if self.same_as == 1 else f"optimum {self.same_as}"
+        more = "; the planner's own starts had led to dearer ones only, and it has gone on from this one" * self.gone_on
+        return f"{said}is the planner's {which}, {self.finished:.5g} in continuous time{more}"
 
 
 @dataclass(frozen=True)
@@ -73,20 +53,13 @@ class Estimate(Result):
     name: ClassVar[str] = "estimate"
     comparisons: tuple[Comparison, ...]
 
-    def tables(self) -> Mapping[str, pd.DataFrame]:
-        return {
-            f"better_than_planner_{one.method}": Solution(one.method, one.motion, Status.SOLVED).to_frame()
-            for one in self.comparisons
-            if one.motion is not None
-        }
-
     def section(self) -> list[str]:
         title = "## What other searches found, beside the planner (an estimate; only a bound excludes more)"
         return [title, "", *(f"- {METHODS[one.method].title}: {one.sentence}." for one in self.comparisons)]
 
     def facts(self) -> Mapping[str, Any]:
         return {
-            one.method: {key: value for key, value in asdict(one).items() if key not in ("method", "motion")}
+            one.method: {key: value for key, value in asdict(one).items() if key != "method"}
             for one in self.comparisons
         }
 
@@ -99,47 +72,23 @@ def study(motions: Motions) -> Estimate | None:
     for method in ON_GRIDS:
         on_grid = [e.solution for e in motions.solved if e.method == method]
         if planned and on_grid:
-            made.append(compare(motions.problem, planned, on_grid, options, Context(workers=motions.workers)))
+            made.append(compare(motions.problem, planned, on_grid[0], options, Context(workers=motions.workers)))
     return Estimate(tuple(made)) if made else None
 
 
 def compare(
-    problem: Problem,
-    planned: list[Solution],
-    on_grid: list[Solution],
-    options: GlobalOptions,
-    context: Context,
+    problem: Problem, planned: list[Solution], other: Solution, options: GlobalOptions, context: Context
 ) -> Comparison:
-    """Of the planner's solutions and another method's, best first and all on the same knots, which may be coarser."""
-    times, knots = on_grid[0].trajectory.time, planned[0].trajectory.time
-    problem, options = replace(problem, times=knots), replace(options, refine_to=None)
-    optima = np.array([solution.trajectory.q for solution in planned])
-    costs = objective_values(problem, knots, optima)
-    first, all_finished = (
-        finish(problem, times, np.array([s.trajectory.q for s in some]), options, context)[1]
-        for some in (on_grid[:1], on_grid)
-    )
-    cheaper = [
-        optimum
-        for optimum in all_finished
-        if optimum.cost < costs.min() * (1 - CHEAPER) and not _number(problem, optimum, optima, options.same_path)
-    ]
-    better = min(cheaper, key=lambda optimum: optimum.cost, default=None)
+    """Of the planner's solutions, best first, and the best one of another method."""
+    same, moved = of_same_path(problem, other, planned, options.same_path), other
+    if same is None:  # an optimum moves with its knots: on the same ones it may be the same
+        moved = next(iter(finished(problem, planned, [other], options, context)), other)
+        same = of_same_path(problem, moved, planned, options.same_path)
     return Comparison(
-        on_grid[0].method,
-        on_grid[0].statistics.get("intervals", len(times) - 1),
-        len(knots) - 1,
-        float(costs[0]),
-        first[0].cost if first else float("nan"),
-        _number(problem, first[0], optima, options.same_path) if first else 0,
-        float("nan") if better is None else better.cost,
-        None if better is None else Trajectory(knots, better.q),
+        other.method,
+        other.statistics.get("intervals", len(other.trajectory.time) - 1),
+        cost(problem, planned[0]),
+        cost(problem, moved if same is None else same),
+        0 if same is None else same.optimum,
+        same is not None and same.statistics.get("continued_from") == other.method,
     )
-
-
-def _number(problem: Problem, optimum: Optimum, optima: Array, same: float) -> int:
-    """Which of the planner's optima (K, N + 1, n) it is, from 1 on; 0: none."""
-    revolute = problem.task.arm.description.revolute
-    apart = [path_distance(optimum.q, q, revolute) for q in optima]
-    nearest = int(np.argmin(apart))
-    return nearest + 1 if apart[nearest] <= same else 0

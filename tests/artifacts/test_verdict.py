@@ -16,6 +16,7 @@ from pipeline.artifacts.verdict import first, status, verdict
 from pipeline.config.documents import Printed
 from pipeline.problem.solution import Status
 from pipeline.studies import export
+from pipeline.studies.estimate import Comparison, Estimate
 from tests.reports import report_of, three_motions
 
 
@@ -75,6 +76,17 @@ def test_what_to_send_and_why(report: Report) -> None:
     clear = 1000 * good.motions.evaluations[1].clearance_between
     assert f"clearance {clear:.3g} mm, peak acceleration " in said
     assert said.endswith("; confirmed by IPOPT; not checked: self-collision.")
+
+
+def test_who_else_leads_to_a_motion(report: Report) -> None:
+    """No search from which the planner has its motion speaks for it, and none that led to another."""
+    good = within(report)
+    motions, resampled = good.motions.evaluations, good.find(export.Resampled)
+    here = Comparison("dynamic_programming", 25, 1.0, 1.0, 1, gone_on=False)
+    others = (replace(here, method="lower_bound", same_as=2), replace(here, method="lower_bound", gone_on=True))
+    for other in others:
+        known = report_of(good.motions.problem, motions, resampled, Estimate((here, other)))
+        assert "; confirmed by IPOPT, dynamic programming leads there too; not checked" in verdict(known)
 
 
 def test_why_nothing_is_sent(report: Report) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -10,14 +11,17 @@ import pytest
 from pipeline.build.problem import prepare
 from pipeline.common.errors import InputError
 from pipeline.config.methods import DynamicProgrammingOptions
-from pipeline.methods.dynamic_programming import dynamic_programming, forward, minima, paths, round_trips, starts
+from pipeline.evaluation.evaluation import evaluate
+from pipeline.methods import dynamic_programming as module
+from pipeline.methods.dynamic_programming import dynamic_programming
 from pipeline.path.curves import circle
 from pipeline.path.reference import Reference
 from pipeline.path.timing import RaisedCosine
 from pipeline.problem.limits import Limits
 from pipeline.problem.objective import Objective
 from pipeline.problem.problem import Boundary, Problem
-from pipeline.problem.solution import Status
+from pipeline.problem.solution import Solution, Status, Trajectory
+from pipeline.search.bellman import forward, minima, paths, round_trips, starts
 from pipeline.search.grid import make_grid
 from tests.support import ROOT, backward_differences, composed, free_line
 
@@ -65,21 +69,46 @@ def test_second_order_from_above(line: Problem) -> None:
     assert 1.6 < order < 2.4
 
 
-def test_solution_and_its_grid_error(line: Problem) -> None:
-    solutions = dynamic_programming(line, DynamicProgrammingOptions())
-    best = solutions[0]
-    assert best.status is Status.SOLVED
-    cost, error = best.statistics["cost"], best.statistics["grid_error"]
-    motion = best.trajectory
-    assert backward_differences(line, motion.time, motion.q[None])[0] == pytest.approx(cost, rel=1e-9)
-    assert BEST_25 < cost < BEST_25 + error
-    assert set(best.statistics["loops"]) == {1, 2}
+@pytest.fixture(scope="module")
+def found(line: Problem) -> list[Solution]:
+    return dynamic_programming(line, DynamicProgrammingOptions())
+
+
+def test_the_least_cost_on_the_grid_and_its_error(line: Problem, found: list[Solution]) -> None:
+    told = found[0].statistics
+    on_grid = starts(line, np.linspace(0, 1, 26), 360)
+    assert backward_differences(line, np.linspace(0, 1, 26), on_grid)[0] == pytest.approx(told["cost"], rel=1e-9)
+    assert BEST_25 < told["cost"] < BEST_25 + told["grid_error"]
+    assert set(told["loops"]) == {1, 2}
+    assert (told["intervals"], told["paths"]) == (25, len(on_grid))
+
+
+def test_a_path_is_a_motion_when_the_planner_has_finished_it(line: Problem, found: list[Solution]) -> None:
+    """On the knots of the problem, with the optima that the Global paper prints; the grid's paths leave theirs."""
+    grid = line.times[::4]
+    raw = Solution("dynamic_programming", Trajectory(grid, starts(line, grid, 360)[0]), Status.SOLVED)
+    judged = [evaluate(line, solution) for solution in found]
+    assert evaluate(line, raw).tracking_error_between > 100 * max(e.tracking_error_between for e in judged)
+    assert all(e.status is Status.SOLVED for e in judged)
+    assert all("confirmed by IPOPT" in solution.evidence for solution in found)
+    costs = [backward_differences(line, line.times, s.trajectory.q[None])[0] for s in found]
+    assert costs == sorted(costs)
+    for printed in (0.0528, 0.0563, 0.0671):  # simulation 1
+        assert np.abs(np.array(costs) - printed).min() < 1e-4
+
+
+def test_a_path_that_is_lost_is_no_motion(line: Problem, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "finish", lambda *arguments: (line.times, []))
+    (only,) = dynamic_programming(line, DynamicProgrammingOptions(nodes=60, intervals=8))
+    assert (only.found, only.status) == (False, Status.NOT_CONVERGED)
+    assert re.fullmatch(r"none of the grid's \d+ paths leads to a motion on the problem's knots", only.message)
 
 
 def test_fixed_start(line: Problem) -> None:
     (best, *_) = dynamic_programming(replace(line, boundary=Boundary.FIXED), DynamicProgrammingOptions())
     np.testing.assert_array_equal(best.trajectory.q[0], Q_INIT)
     # 0.06093 is the optimum on 101 points; 25 intervals and the nodes add a little.
+    assert backward_differences(line, line.times, best.trajectory.q[None])[0] == pytest.approx(0.06093, abs=5e-6)
     assert 0.0609 < best.statistics["cost"] < 0.0635
 
 

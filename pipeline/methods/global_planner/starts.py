@@ -15,27 +15,35 @@ from scipy.interpolate import CubicSpline
 
 from pipeline.common.arrays import Array
 from pipeline.config.methods import GlobalOptions
-from pipeline.methods import dynamic_programming
 from pipeline.problem.problem import Problem
+from pipeline.search import bellman
 from pipeline.search.configurations import starting_points
 from pipeline.search.population import population, ranking
 from pipeline.search.roadmap import Roadmap
 from pipeline.search.selection import diverse
 
 Further = Callable[[int], Array]  # about so many more motions
+Known = Callable[[Array], Array]  # motions (K, N + 1, n) on any knots (N + 1,)
 
 
 @dataclass
 class Starts:
-    """`first` (K, N + 1, n) on the knots `grid`, best first by generator; `log`: how they came about."""
+    """`first` (K, N + 1, n) on the knots `grid`, best first by generator, or those that are
+    `known`; `log`: how they came about.
+    """
 
     problem: Problem
     grid: Array
     options: GlobalOptions
     rng: np.random.Generator
+    known: Known | None = None
     log: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        if self.known is not None:
+            self.first = self.known(self.grid)
+            self._further: list[Further] = [self.none]
+            return
         lots = [GENERATORS[name](self) for name in self.options.generators]
         self.first = np.concatenate([first for first, _ in lots])
         self._further = [further for _, further in lots]
@@ -84,7 +92,7 @@ def _population(starts: Starts) -> tuple[Array, Further]:
 
 def _dynamic_programming(starts: Starts) -> tuple[Array, Further]:
     """One for each valley that the grid shows: there are no others."""
-    paths = dynamic_programming.starts(starts.problem, starts.grid)
+    paths = bellman.starts(starts.problem, starts.grid)
     starts.log["dynamic_programming_paths"] = len(paths)
     return paths.reshape(-1, *starts.none().shape[1:]), starts.none
 
