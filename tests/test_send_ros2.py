@@ -34,7 +34,7 @@ def send(robot: Robot, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Se
     def sent(*words: str, faults: tuple[str, ...] = ()) -> tuple[int, str]:
         rates = np.outer(np.sin(TIME), [0.4, -0.2]), np.outer(np.cos(TIME), [0.4, -0.2])
         motion = Resampled("global", 1, TIME, Q, *rates, 0.0, 0.0, {}, {}, faults)
-        motion_files.save(tmp_path, motion, JOINTS, "base", ["ros2"])
+        motion_files.save_motion(tmp_path, motion, JOINTS, "base", ["ros2"])
         script = runpy.run_path(str(ROOT / "docs" / "send_ros2.py"))
         code = script["main"]([str(tmp_path / "motion.json"), "--controller", "/arm", *words])
         said = capsys.readouterr()

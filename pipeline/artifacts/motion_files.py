@@ -56,16 +56,18 @@ def write(report: Report, folder: Path) -> None:
     """What `export.format` asks for in `folder`, where there is a motion to export."""
     arm, motion = report.motions.problem.task.arm.description, report.find(Resampled)
     if motion is not None:
-        save(folder, motion, arm.actuated, arm.base, report.motions.config.export.format)
+        save_motion(folder, motion, arm.actuated, arm.base, report.motions.config.export.format)
 
 
-def save(
-    folder: Path, motion: Resampled, joints: Sequence[str], frame: str, formats: Sequence[str] = ("csv", "ros2")
+def save_motion(
+    folder: str | Path, motion: Resampled, joints: Sequence[str], frame: str, formats: Sequence[str] = ("csv", "ros2")
 ) -> None:
-    """The files of one motion, of an arm with these joints on the link `frame`."""
+    """Write a motion (`resample`) of an arm with these joints on the link `frame` into `folder`: motion.csv and, for
+    ROS 2, motion.yaml and motion.json; formats may name moveit and urscript too.
+    """
     for kind in formats:
         for name, text in FORMATS[kind](motion, joints, frame).items():
-            write_beside(folder / name, partial(_put, text))
+            write_beside(Path(folder) / name, partial(_put, text))
 
 
 def _put(text: str, file: Path) -> None:

@@ -11,9 +11,14 @@ from pipeline.model.kinematics import ATTEMPTS, reach
 from pipeline.problem.problem import CLOSED, Boundary, Problem
 from pipeline.robot.limits import require_room
 
+TURN = 2 * np.pi  # [rad] and more of a joint: it may have been written in degrees
 
-def check_problem(problem: Problem) -> None:
-    """Refuse what no motion can meet: contradicting limits, a fixed start outside them, an open path for a cycle."""
+
+def check_problem(problem: Problem, moved: bool = False) -> None:
+    """Refuse what no motion can meet: contradicting limits, a fixed start outside them, an open path for a cycle.
+
+    moved: whether the start is not robot.q_init but was sought from there for a path that says where it begins.
+    """
     limits, description = problem.bounds, problem.task.arm.description
     names = description.joints
     for key, values in (("velocity", limits.velocity), ("effort", limits.torque)):
@@ -26,9 +31,13 @@ def check_problem(problem: Problem) -> None:
     if problem.boundary is Boundary.FIXED:
         outside = np.flatnonzero((problem.q_init < limits.lower) | (problem.q_init > limits.upper))
         for joint in outside:
+            value, turns = problem.q_init[joint], description.revolute[joint]
+            where = ", moved to where the path begins," if moved else ""
+            degrees = f"; in degrees? {value:g} deg are {np.deg2rad(value):.4g} rad"
             raise ConfigError(
-                f"robot.q_init of {names[joint]} is {problem.q_init[joint]:.4g}, outside its limits "
-                f"{limits.lower[joint]:.4g} to {limits.upper[joint]:.4g}, and boundary = fixed starts there"
+                f"robot.q_init of {names[joint]}{where} is {value:.4g}, outside its limits {limits.lower[joint]:.4g} "
+                f"to {limits.upper[joint]:.4g} {'rad' if turns else 'm'}, and boundary = fixed starts there"
+                + (degrees if turns and abs(value) > TURN else "")
             )
         for close in _closest(problem) if problem.keeps_clear and too_near(problem, problem.q_init) else ():
             if close.distance < close.margin:

@@ -68,6 +68,11 @@ class Description:
         """Which of the arm's own joints turn."""
         return self.revolute[self.base_coordinates :]
 
+    def unit(self, joint: int | None = None) -> str:
+        """Of the position of one of the arm's own joints; of all of them where none is given."""
+        turns = self.turning if joint is None else self.turning[[joint]]
+        return "rad" if turns.all() else "rad or m" if turns.any() else "m"
+
     @cached_property
     def for_drake(self) -> tuple[str, str]:
         """The reduced URDF and its root link."""

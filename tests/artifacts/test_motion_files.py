@@ -23,7 +23,7 @@ def motion() -> Resampled:
 
 
 def test_the_table(motion: Resampled, tmp_path: Path) -> None:
-    export.save(tmp_path, motion, JOINTS, "base")
+    export.save_motion(tmp_path, motion, JOINTS, "base")
     table = pd.read_csv(tmp_path / "motion.csv")
     kinds = ("position", "velocity", "acceleration")
     assert list(table.columns) == ["time", *(f"{joint}_{kind}" for kind in kinds for joint in JOINTS)]
@@ -33,7 +33,7 @@ def test_the_table(motion: Resampled, tmp_path: Path) -> None:
 
 def test_the_message_of_ros(motion: Resampled, tmp_path: Path) -> None:
     """The fields of trajectory_msgs/JointTrajectory and of its points, neither more nor fewer."""
-    export.save(tmp_path, motion, JOINTS, "base")
+    export.save_motion(tmp_path, motion, JOINTS, "base")
     message = json.loads((tmp_path / "motion.json").read_text(encoding="utf-8"))
     assert yaml.safe_load((tmp_path / "motion.yaml").read_text(encoding="utf-8")) == message
     assert list(message) == ["header", "joint_names", "points"]
@@ -58,7 +58,7 @@ def test_a_time_just_below_a_second_is_that_second(motion: Resampled) -> None:
 
 def test_moveit_and_universal_robots(motion: Resampled, tmp_path: Path) -> None:
     """A RobotTrajectory around the same message; a program that begins where the motion does and takes its time."""
-    export.save(tmp_path, motion, JOINTS, "base", ["moveit", "urscript"])
+    export.save_motion(tmp_path, motion, JOINTS, "base", ["moveit", "urscript"])
     assert sorted(file.name for file in tmp_path.iterdir()) == ["motion.script", "motion_moveit.yaml"]
     text = (tmp_path / "motion_moveit.yaml").read_text(encoding="utf-8")
     message = yaml.safe_load(text)

@@ -105,7 +105,7 @@ class Stages:
                 if fine or count == most:
                     break
         else:
-            status = f"steps of {size:.1e} rad after {count} programs"
+            status = f"steps of {size:.1e} after {count} programs"
         q = np.vstack([window.q_init, x])
         return Answer(q, stage.cost(x), fine, status, count, window.times[1:], z)
 
