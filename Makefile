@@ -4,6 +4,8 @@ VENV := .venv
 BIN := $(VENV)/bin
 # As the package sets it for itself: where numpy is loaded before, as in the tests, that is too late.
 export OMP_NUM_THREADS := 1
+# Compiled files are kept, whatever the shell says: every process that a test starts would compile the package again.
+export PYTHONDONTWRITEBYTECODE :=
 
 .DEFAULT_GOAL := help
 .PHONY: help run reproduce audit readings test fast lint format cover bench package docs pictures clean schema

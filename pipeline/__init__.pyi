@@ -1,5 +1,6 @@
 """The public names: what type checkers read, and the one list from which they are imported when first used."""
 
+from .artifacts.motion_files import save_motion as save_motion
 from .common.errors import InputError as InputError
 from .common.workers import Workers as Workers
 from .evaluation.evaluation import Evaluation as Evaluation
@@ -44,3 +45,4 @@ from .problem.solution import Status as Status
 from .problem.solution import Trajectory as Trajectory
 from .robot.mounting import Mounting as Mounting
 from .robot.spacecraft import Spacecraft as Spacecraft
+from .studies.export import resample as resample

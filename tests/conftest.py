@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-import pickle
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -12,8 +11,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hydra._internal.config_repository import ConfigRepository
-from hydra.plugins.config_source import ConfigResult
 from hypothesis import settings
 
 from pipeline.common.arrays import Array
@@ -25,7 +22,7 @@ from pipeline.path.reference import Reference
 from pipeline.path.timing import RaisedCosine
 from pipeline.problem.problem import Problem
 from pipeline.robot import urdf
-from pipeline.run.main import CONF
+from tests.composing import compose_once
 from tests.once import made_once
 from tests.support import ROOT
 
@@ -42,25 +39,9 @@ def pytest_collection_finish() -> None:
 
 
 @pytest.fixture(scope="session", autouse=True)
-def _files_of_conf_are_read_once() -> Iterator[None]:
-    """Hydra parses every file again whenever it composes, which takes a third of its time. Nobody changes these files
-    while tests run.
-    """
-    load = ConfigRepository.load_config
-    read: dict[tuple[str, ...], bytes] = {}
-
-    def load_once(repository: ConfigRepository, config_path: str) -> ConfigResult | None:
-        places = [source.path for source in repository.get_sources()]
-        if not {*places} <= {"hydra.conf", "", str(ROOT / "conf"), CONF}:
-            return load(repository, config_path)
-        key = (config_path, *places)
-        if key not in read:
-            read[key] = pickle.dumps(load(repository, config_path))
-        made: ConfigResult | None = pickle.loads(read[key])
-        return made
-
+def _composed_once() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(ConfigRepository, "load_config", load_once)
+        compose_once(patch)
         yield
 
 

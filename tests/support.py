@@ -110,17 +110,25 @@ BOX = Shape("box", "box", (0.2, 0.1, 0.3), (0.1, -0.4, 0.4), (0.3, 0.2, -0.5))
 
 
 def with_shapes(name: str) -> Arm:
-    """planar3r has no shapes of its own: capsules along its links."""
+    """Capsules in place of the arm's own shapes, along the longest edge of the box around each; planar3r has none of
+    its own.
+    """
     arm = robot(name)
-    if arm.description.collision:
-        return arm
-    rods = [
-        capsule(f"r{i}", np.zeros(3), np.array([length, 0, 0]), 0.02, f"link{i}")
-        for i, length in ((1, 0.25), (2, 0.25), (3, 0.3))
-    ]
     links = [link for link in arm.description.links if link != arm.description.base]
-    rods = [replace(rod, frame=link) for rod, link in zip(rods, links, strict=False)]
+    ends = zip((0.25, 0.25, 0.3), links, strict=False)
+    rods = [capsule(f"{link} rod", np.zeros(3), np.array([length, 0, 0]), 0.02, link) for length, link in ends]
+    if arm.description.collision:
+        rods = [_rod(shape) for shape in arm.description.collision]
     return Arm(replace(arm.description, collision=tuple(rods)))
+
+
+def _rod(shape: Shape) -> Shape:
+    if shape.kind == "cylinder":
+        return replace(shape, kind="capsule")
+    corners = shape.placed(shape.points)
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    along = np.eye(3)[(high - low).argmax()] * (high - low) / 2
+    return capsule(shape.name, (low + high) / 2 - along, (low + high) / 2 + along, 0.05, shape.frame)
 
 
 def _ends(shape: Shape, position: Array, rotation: Array) -> Array:

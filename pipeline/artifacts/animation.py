@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import shutil
 from functools import partial
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+import matplotlib as mpl
 import numpy as np
 from matplotlib.animation import FFMpegWriter, FuncAnimation, PillowWriter
 
@@ -31,7 +34,18 @@ def write(report: Report, folder: Path) -> None:
     if kind is None or not shown:
         return
     film = draw(report, shown)
-    write_beside(folder / f"animation.{kind}", partial(film.save, writer=WRITERS[kind](fps=PER_SECOND), dpi=DPI))
+    with mpl.rc_context({"animation.ffmpeg_path": ffmpeg() or "ffmpeg"}):
+        write_beside(folder / f"animation.{kind}", partial(film.save, writer=WRITERS[kind](fps=PER_SECOND), dpi=DPI))
+
+
+def ffmpeg() -> str | None:
+    """The program: that of the system, or the one that the package imageio-ffmpeg brings; None without either."""
+    if (found := shutil.which("ffmpeg")) is not None:
+        return found
+    try:
+        return str(import_module("imageio_ffmpeg").get_ffmpeg_exe())
+    except (ImportError, RuntimeError):
+        return None
 
 
 def draw(report: Report, motions: list[Evaluation]) -> FuncAnimation:

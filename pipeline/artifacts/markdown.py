@@ -14,6 +14,7 @@ from pipeline.artifacts.verdict import verdict
 from pipeline.common.markdown import markdown_table
 from pipeline.config.documents import Printed
 from pipeline.evaluation.limits import LIMITS
+from pipeline.model.obstacles import Own
 from pipeline.problem.integrals import INTEGRALS
 
 UNITS = {
@@ -29,6 +30,8 @@ UNITS = {
     "singular_time": "s",
     "min_clearance": "m",
     "min_clearance_between": "m",
+    "min_self_clearance": "m",
+    "min_self_clearance_time": "s",
     "peak_reaction_force": "N",
     "peak_reaction_torque": "N m",
     "max_base_turn": "rad",
@@ -74,6 +77,7 @@ def markdown(report: Report, table: pd.DataFrame, published: Printed) -> str:
     for e in motions.evaluations:
         lines.append("; ".join(filter(None, [f"- **{e.label}**: {e.message or e.status.value}", e.solution.evidence])))
     lines += [f"- robot file: {note}" for note in arm.notes]
+    lines += own_notes(motions.problem.own)
     lines += [f"- path: {note}" for note in reference.notes]
     for title, group in _details(report, table):
         lines += ["", f"## {title}", "", *markdown_table([["", *(e.label for e in motions.evaluations)], *group])]
@@ -90,6 +94,19 @@ def markdown(report: Report, table: pd.DataFrame, published: Printed) -> str:
         "",
     ]
     return "\n".join(lines)
+
+
+def own_notes(own: Own | None) -> list[str]:
+    """What is not known of the arm and itself."""
+    if own is None:
+        return ["- not checked: self-collision (collision.self=true or false checks it, where the arm has shapes)"]
+    if own.unknown:
+        return [f"- not checked: self-collision ({own.unknown})"]
+    named = ", ".join(" - ".join(pair) for pair in own.always)
+    lines = [f"- not checked: {named}, which touch wherever the arm is"] if named else []
+    if own.allowed:
+        lines.append(f"- not checked: {own.allowed} pairs of links that the SRDF or collision.allow let touch")
+    return lines
 
 
 def _details(report: Report, table: pd.DataFrame) -> list[tuple[str, list[list[str]]]]:

@@ -11,12 +11,14 @@ from typing import Any
 import numpy as np
 
 from pipeline.artifacts.report import Report
+from pipeline.artifacts.verdict import first
 from pipeline.common.files import write_beside
 
 
 def write(report: Report, folder: Path) -> None:
     """run.json in `folder`: versions, seed, exit code, statistics of every solve, timings, machine, configuration."""
     motions = report.motions
+    best = first(report) if report.motions.solved else None  # to be sent, or else the best
     solved = [
         {
             "method": e.method,
@@ -29,6 +31,7 @@ def write(report: Report, folder: Path) -> None:
     content = {
         **report.facts,
         "exit_code": report.exit_code,
+        "chosen": None if best is None else {"method": best.method, "optimum": best.solution.optimum},
         "cpu_count": os.cpu_count(),
         "stages_s": dict(report.stages),
         "methods_s": dict(report.seconds),

@@ -146,6 +146,10 @@ def _row(problem: Problem, e: Evaluation) -> dict[str, Any]:
     row |= _base(problem, e)
     if problem.obstacles is not None:
         row |= {"min_clearance": e.clearance.min(), "min_clearance_between": e.clearance_between}
+    own = e.near.own
+    if np.isfinite(own.bound):
+        row |= {"min_self_clearance": own.bound, "min_self_clearance_time": own.time}
+        row |= {"min_self_clearance_links": f"{own.first} - {own.second}"}
     for suffix, excess in (("", e.limit_excess), ("_between", e.limit_excess_between)):
         row |= {f"{kind}_limit_excess{suffix}": value for kind, value in excess.items()}
     row |= {

@@ -4,15 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 
+from pipeline.build.collision import too_near
 from pipeline.common.errors import ConfigError, PathError
-from pipeline.model.clearance import Clearance
+from pipeline.model.clearance import Clearance, Close
 from pipeline.model.kinematics import ATTEMPTS, reach
 from pipeline.problem.problem import CLOSED, Boundary, Problem
 from pipeline.robot.limits import require_room
 
+TURN = 2 * np.pi  # [rad] and more of a joint: it may have been written in degrees
 
-def check_problem(problem: Problem) -> None:
-    """Refuse what no motion can meet: contradicting limits, a fixed start outside them, an open path for a cycle."""
+
+def check_problem(problem: Problem, moved: bool = False) -> None:
+    """Refuse what no motion can meet: contradicting limits, a fixed start outside them, an open path for a cycle.
+
+    moved: whether the start is not robot.q_init but was sought from there for a path that says where it begins.
+    """
     limits, description = problem.bounds, problem.task.arm.description
     names = description.joints
     for key, values in (("velocity", limits.velocity), ("effort", limits.torque)):
@@ -25,22 +31,38 @@ def check_problem(problem: Problem) -> None:
     if problem.boundary is Boundary.FIXED:
         outside = np.flatnonzero((problem.q_init < limits.lower) | (problem.q_init > limits.upper))
         for joint in outside:
+            value, turns = problem.q_init[joint], description.revolute[joint]
+            where = ", moved to where the path begins," if moved else ""
+            degrees = f"; in degrees? {value:g} deg are {np.deg2rad(value):.4g} rad"
             raise ConfigError(
-                f"robot.q_init of {names[joint]} is {problem.q_init[joint]:.4g}, outside its limits "
-                f"{limits.lower[joint]:.4g} to {limits.upper[joint]:.4g}, and boundary = fixed starts there"
+                f"robot.q_init of {names[joint]}{where} is {value:.4g}, outside its limits {limits.lower[joint]:.4g} "
+                f"to {limits.upper[joint]:.4g} {'rad' if turns else 'm'}, and boundary = fixed starts there"
+                + (degrees if turns and abs(value) > TURN else "")
             )
-        if problem.obstacles is not None:
-            distance, link, obstacle = Clearance(problem.task.arm, problem.obstacles).closest(problem.q_init)
-            if distance < problem.obstacles.margin:
-                raise ConfigError(
-                    f"robot.q_init: {link} is {distance:.3g} m from obstacle {obstacle}, less than obstacles.margin = "
-                    f"{problem.obstacles.margin:g} m, and boundary = fixed starts there"
-                )
+        for close in _closest(problem) if problem.keeps_clear and too_near(problem, problem.q_init) else ():
+            if close.distance < close.margin:
+                raise ConfigError(f"robot.q_init: {_said(close)}, and boundary = fixed starts there")
     if problem.boundary is Boundary.CYCLIC and not problem.closed_path:
         gaps = [f"{gap:.3g} {unit}" for gap, unit in zip(problem.gap, ("m", "rad"), strict=True) if gap > CLOSED]
         raise PathError(
             f"boundary = cyclic: the path ends {' and '.join(gaps)} from where it starts; a cycle needs a closed path"
         )
+
+
+def _closest(problem: Problem) -> list[Close]:
+    return Clearance(problem.task.arm, problem.obstacles, problem.own).closest(problem.q_init)
+
+
+def _said(close: Close) -> str:
+    if close.kind == "clearance":
+        return (
+            f"{close.first} is {close.distance:.3g} m from obstacle {close.second}, less than obstacles.margin = "
+            f"{close.margin:g} m"
+        )
+    return (
+        f"{close.first} is {close.distance:.3g} m from {close.second}, less than collision.margin = {close.margin:g} m "
+        f"(collision.allow=[[{close.first},{close.second}]] lets them touch)"
+    )
 
 
 def require_reach(problem: Problem) -> None:

@@ -87,10 +87,8 @@ def make_obstacles(obstacles: ObstaclesConfig, arm: Arm) -> Obstacles | None:
     if not obstacles.shapes:
         return None
     if not arm.description.collision:
-        meshes = f" (those of {', '.join(arm.description.meshes)} are meshes)" if arm.description.meshes else ""
         raise ConfigError(
-            f"obstacles.shapes: {arm.description.name} has no primitive collision shapes{meshes}; give spheres, boxes "
-            "or capsules in robot.collision"
+            f"obstacles.shapes: {arm.description.name} has no collision shapes; give them in robot.collision"
         )
     shapes = tuple(make_shape(name, shape) for name, shape in obstacles.shapes.items())
     return Obstacles(shapes, obstacles.margin, obstacles.influence)

@@ -71,11 +71,12 @@ def check_rest(problem: Problem) -> None:
             )
         return
     if problem.rest[0] and unlimited_start(problem):
+        unit = problem.task.arm.description.unit()
         raise ConfigError(
             "boundary.rest: with a given start and an objective of velocities there is no best motion from rest "
             "unless the accelerations of all joints are limited: it would jump to its speed within one step, however "
-            f"short; set limits.acceleration, such as {suggested(problem):g} rad/s^2, or a file of them in limits.file "
-            "or robot.limits; boundary.rest=[] lets it jump"
+            f"short; set limits.acceleration, such as {suggested(problem):g} {unit}/s^2, or a file of them in "
+            "limits.file or robot.limits; boundary.rest=[] lets it jump"
         )
 
 

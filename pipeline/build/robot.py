@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from pipeline.build.regular import require_regular
 from pipeline.common.arrays import Array
 from pipeline.common.errors import ConfigError, RobotError
-from pipeline.config.robot import CapsuleConfig, RobotConfig, SphereConfig
+from pipeline.config.robot import BoxConfig, CapsuleConfig, CylinderConfig, RobotConfig, SphereConfig
 from pipeline.model.arm import Arm
 from pipeline.robot import urdf
 from pipeline.robot.description import Description
@@ -34,7 +34,7 @@ def load(robot: RobotConfig, gravity: str | Sequence[float] = "none") -> Arm:
         repair_inertia=robot.repair_inertia,
         unlimited=robot.unlimited,
     )
-    if robot.collision is not None:
+    if robot.collision != "file":
         shapes = _link_shapes(robot.collision, description)
         description = replace(description, collision=shapes)
     if isinstance(robot.armature, tuple) and len(robot.armature) != len(description.joints):
@@ -74,7 +74,11 @@ def make_shape(name: str, shape: Any, frame: str | None = None) -> Shape:
     if isinstance(shape, SphereConfig):
         return Shape(name, "sphere", (shape.radius,), center, frame=frame)
     turn = tuple(Rotation.from_euler("xyz", shape.rpy).as_rotvec().tolist())
-    return Shape(name, "box", tuple(shape.size), center, turn, frame)
+    if isinstance(shape, BoxConfig):
+        return Shape(name, "box", tuple(shape.size), center, turn, frame)
+    if isinstance(shape, CylinderConfig):
+        return Shape(name, "cylinder", (shape.radius, shape.length), center, turn, frame)
+    return Shape(name, "mesh", tuple(shape.scale), center, turn, frame, str(find(shape.file, "file of a mesh")))
 
 
 def _link_shapes(table: Mapping[str, Sequence[Any]], description: Description) -> tuple[Shape, ...]:

@@ -87,6 +87,8 @@ Words = Annotated[tuple[T, ...], Field(min_length=1), AfterValidator(once)]
 # One for all (joints, axes), or a list.
 OneOrList = Annotated[Annotated[T, Tag("number")] | Annotated[tuple[T, ...], Tag("array")], Discriminator(_kind)]
 WordOrWords = Annotated[Annotated[T, Tag("string")] | Annotated[Words[T], Tag("array")], Discriminator(_kind)]
+W = TypeVar("W")
+WordOrTable = Annotated[Annotated[W, Tag("string")] | Annotated[T, Tag("other")], Discriminator(_kind)]
 WordOrPositive = Annotated[
     Annotated[T, Tag("string")] | Annotated[Annotated[Number, Field(gt=0)], Tag("number")], Discriminator(_kind)
 ]

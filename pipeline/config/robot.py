@@ -1,4 +1,4 @@
-"""Groups `robot`, `base` and `obstacles`: the arm, what it stands on, and the solids around it."""
+"""Groups `robot`, `base`, `obstacles` and `collision`: the arm, what it stands on, the solids around it, and itself."""
 
 from __future__ import annotations
 
@@ -7,13 +7,14 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from pipeline.config.fields import Name, Number, OneOrList, Pose, Switch, Text, Vector, Words, schema
+from pipeline.config.fields import Name, Number, OneOrList, Pose, Switch, Text, Vector, WordOrTable, Words, schema
 
 Position = Annotated[Number, Field(ge=-1e4, le=1e4)]  # [rad or m] of a joint: a sine is exact there
 Positions = tuple[Position, ...]
 Positive = Annotated[Number, Field(gt=0)]
 Edges = Annotated[tuple[Positive, ...], Field(min_length=3, max_length=3)]
 Momentum = Annotated[tuple[Annotated[Number, Field(ge=-1e6, le=1e6)], ...], Field(min_length=3, max_length=3)]
+Pair = Annotated[tuple[Text, ...], Field(min_length=2, max_length=2)]
 ORIGIN = (0.0, 0.0, 0.0)
 
 
@@ -46,7 +47,29 @@ class CapsuleConfig:
     radius: Annotated[Positive, Field(description="[m] distance from the segment")] = 0.1
 
 
-Shape = Annotated[SphereConfig | BoxConfig | CapsuleConfig, Field(discriminator="kind")]
+@schema
+class CylinderConfig:
+    """A cylinder along its z axis."""
+
+    kind: Literal["cylinder"] = "cylinder"
+    center: Annotated[Vector, Field(description="[m] centre")] = ORIGIN
+    radius: Annotated[Positive, Field(description="[m] radius")] = 0.1
+    length: Annotated[Positive, Field(description="[m] length")] = 0.1
+    rpy: Annotated[Vector, Field(description="[rad] roll, pitch, yaw")] = ORIGIN
+
+
+@schema
+class MeshConfig:
+    """The convex hull of a mesh file."""
+
+    file: Annotated[Text, Field(description="STL, OBJ, DAE, PLY or GLB: a path, or package://package/file")]
+    kind: Literal["mesh"] = "mesh"
+    scale: Annotated[Edges, Field(description="of the file's x, y, z; 0.001 each of a file in mm")] = (1.0, 1.0, 1.0)
+    center: Annotated[Vector, Field(description="[m] where its origin is")] = ORIGIN
+    rpy: Annotated[Vector, Field(description="[rad] roll, pitch, yaw")] = ORIGIN
+
+
+Shape = Annotated[SphereConfig | BoxConfig | CapsuleConfig | CylinderConfig | MeshConfig, Field(discriminator="kind")]
 
 
 @schema
@@ -77,10 +100,22 @@ class RobotConfig:
     ] = "none"
     pointing: Annotated[Vector, Field(description="axis in the end effector's frame")] = (0.0, 0.0, 1.0)
     collision: Annotated[
-        dict[str, tuple[Shape, ...]] | None,
-        Field(description="{link: [{kind: sphere, box or capsule, ...}, ...]}; null: the primitive shapes of the file"),
+        WordOrTable[Literal["file"], dict[str, tuple[Shape, ...]]],
+        Field(
+            description="file: the shapes of the file, meshes as their hulls; or in their place "
+            "{link: [{kind: sphere, box, capsule, cylinder or mesh, ...}, ...]}"
+        ),
+    ] = "file"
+    srdf: Annotated[
+        Text | None, Field(description="SRDF that comes with the file: which links may touch; null: none")
     ] = None
-    q_init: Annotated[Positions | None, Field(description="[rad] initial configuration, base to tip")] = (
+    q_init: Annotated[
+        Positions | None,
+        Field(
+            description="[rad] initial configuration, base to tip; null: of a path that says where in the world it is, "
+            "the best one, sought in the whole joint space; of others the middle of the joints' ranges"
+        ),
+    ] = (
         0.0,
         0.327,
         -0.754,
@@ -144,5 +179,32 @@ class ObstaclesConfig:
         Positive, Field(description="[m] beyond the margin, from where on the solver feels an obstacle")
     ] = 0.05
     shapes: Annotated[
-        dict[str, Shape], Field(description="{name: {kind: sphere, box or capsule, ...}, ...} in the world")
+        dict[str, Shape],
+        Field(description="{name: {kind: sphere, box, capsule, cylinder or mesh, ...}, ...} in the world"),
     ] = field(default_factory=dict)
+
+
+@schema
+class CollisionConfig:
+    """Group `collision`: the arm and itself. Pairs of links that are joined to each other may always touch."""
+
+    own: Annotated[
+        Switch | None,
+        Field(
+            alias="self",
+            description="whether motions keep the arm clear of itself; null: if it moves in space and has shapes",
+        ),
+    ] = None
+    margin: Annotated[Positive, Field(description="[m] least distance of two links")] = 0.005
+    influence: Annotated[
+        Positive, Field(description="[m] beyond the margin, from where on the solver feels another link")
+    ] = 0.05
+    srdf: Annotated[
+        Text | None,
+        Field(
+            description="SRDF whose disable_collisions say which links may touch; null: robot.srdf; none: of no file"
+        ),
+    ] = None
+    allow: Annotated[
+        tuple[Pair, ...], Field(description="[[link, link], ...] that may touch, besides those of the SRDF")
+    ] = ()

@@ -10,11 +10,11 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from pipeline.config.fields import Name, Number, Switch, Text, Whole, WordOrVector, Words, build, schema
+from pipeline.config.fields import Name, Number, Switch, Text, Whole, WordOrVector, WordOrWords, Words, build, schema
 from pipeline.config.goal import BoundaryConfig, KineticEnergyConfig, LimitsConfig, ObjectiveConfig
 from pipeline.config.methods import MethodConfig, MethodName
 from pipeline.config.path import CircleConfig, LineConfig, TimingConfig, WaypointsConfig
-from pipeline.config.robot import FixedBaseConfig, FreeBaseConfig, ObstaclesConfig, RobotConfig
+from pipeline.config.robot import CollisionConfig, FixedBaseConfig, FreeBaseConfig, ObstaclesConfig, RobotConfig
 from pipeline.config.steps import refuse_endless, refuse_endless_search
 from pipeline.config.studies import (
     CandidateStudyConfig,
@@ -41,6 +41,19 @@ class ParallelConfig:
     ] = 60.0
 
 
+# Columns of summary.csv; peak_torque and its like: the largest of their joints'.
+Measure = Literal[
+    "kinetic_energy_integral",
+    "torque_integral",
+    "peak_velocity",
+    "peak_torque",
+    "peak_power",
+    "max_tracking_error_between",
+    "min_clearance_between",
+    "wall_time_s",
+]
+
+
 @schema
 class SweepConfig:
     """What a sweep does besides its runs."""
@@ -48,6 +61,13 @@ class SweepConfig:
     resume: Annotated[
         Switch, Field(description="skip runs that are finished when a sweep is started again in its hydra.sweep.dir")
     ] = True
+    objective: Annotated[
+        WordOrWords[Measure] | None,
+        Field(
+            description="number in SI units, or numbers, of each run's motion to send (else its best) that a sweeper "
+            "such as Optuna's optimises; null: none"
+        ),
+    ] = None
 
 
 @schema
@@ -56,7 +76,7 @@ class ArtifactsConfig:
 
     animation: Annotated[
         Literal["gif", "mp4"] | None,
-        Field(description="a film of the motions for slides; mp4 needs ffmpeg; null: none"),
+        Field(description="a film of the motions for slides; mp4 needs ffmpeg (the extra film); null: none"),
     ] = None
 
 
@@ -82,6 +102,7 @@ class RunConfig:
     limits: LimitsConfig = LimitsConfig()
     boundary: BoundaryConfig = BoundaryConfig()
     obstacles: ObstaclesConfig = ObstaclesConfig()
+    collision: CollisionConfig = CollisionConfig()
     method: MethodConfig = MethodConfig()
     parallel: ParallelConfig = ParallelConfig()
     sweep: SweepConfig = SweepConfig()

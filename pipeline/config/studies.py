@@ -23,7 +23,7 @@ class CandidateStudyConfig:
 
 @schema
 class ExportConfig:
-    """The motion that is written for a controller: motion.csv, and motion.yaml and motion.json for ROS 2."""
+    """The motion that is written for a controller, by default as a table and for ROS 2."""
 
     method: Annotated[
         Literal["best", "none", MethodName],
@@ -33,6 +33,13 @@ class ExportConfig:
     force: Annotated[
         Switch, Field(description="whether a motion that cannot be sent is written all the same; its files say so")
     ] = False
+    format: Annotated[
+        Words[Literal["csv", "ros2", "moveit", "urscript"]],
+        Field(
+            description="what is written: csv: motion.csv; ros2: motion.yaml and motion.json (JointTrajectory); "
+            "moveit: motion_moveit.yaml (RobotTrajectory); urscript: motion.script for an arm of Universal Robots"
+        ),
+    ] = ("csv", "ros2")
 
 
 @schema

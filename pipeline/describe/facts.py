@@ -50,8 +50,6 @@ def inspect(robot: RobotConfig, gravity: str | Sequence[float] = "none") -> Fact
     outside = (q_init < description.lower) | (q_init > description.upper)
     for joint in np.flatnonzero(outside):
         notes.append(f"robot.q_init of {description.joints[joint]} is outside its limits")
-    if description.meshes and not description.collision:
-        notes.append("collision shapes are meshes: for obstacles give spheres, boxes or capsules in robot.collision")
     if arm.mounting.payload > 0:
         notes.append(f"a payload of {arm.mounting.payload:g} kg at the end effector")
     rotors = arm.mounting.rotors(arm.n)

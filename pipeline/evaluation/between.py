@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -10,6 +11,7 @@ from scipy.interpolate import CubicSpline
 
 from pipeline.common.arrays import Array
 from pipeline.evaluation.base import angle_between
+from pipeline.evaluation.certified import Near, near
 from pipeline.evaluation.clearance import Clearance
 from pipeline.evaluation.limits import excesses, limit_excess, of_tool
 from pipeline.evaluation.plant import SinglePlant
@@ -18,17 +20,15 @@ from pipeline.problem.problem import Boundary, Problem
 from pipeline.problem.solution import Trajectory
 
 BETWEEN = 10  # sub-intervals per knot interval on which the motion between knots is judged
-CLEARANCES = 5  # of those at which distances from obstacles are taken
 
 
 @dataclass(frozen=True)
 class Between:
-    """What the cubic spline through the knots does, by Simpson's rule: its objective, smallest clearance, excess of
+    """What the cubic spline through the knots does, by Simpson's rule: its objective, excess of
     limits, and running integrals (N + 1,) by their names, that of w as `secondary`. Torques count where they are known.
     """
 
     objective: float = float("nan")
-    clearance: float = float("nan")
     limit_excess: dict[str, float] = field(default_factory=dict)
     running: dict[str, Array] = field(default_factory=dict)
 
@@ -38,7 +38,7 @@ class Between:
 
 
 def between_knots(
-    problem: Problem, plant: SinglePlant, clearance: Clearance, trajectory: Trajectory, qd_start: Array
+    problem: Problem, plant: SinglePlant, clear: Near, trajectory: Trajectory, qd_start: Array
 ) -> Between:
     """The spline that a motion is; or the one through its knots, from rest where torques count."""
     if not np.all(np.isfinite(trajectory.q)):
@@ -78,10 +78,11 @@ def between_knots(
         for name, rate in (rates | {"secondary": secondary}).items()
     }
     ends_at = {name: float(running[name][-1]) for name in running}
-    clear = float(clearance(q[:: BETWEEN // CLEARANCES]).min())
     turn = float(angle_between(plant.start, way).max())
-    excess = limit_excess(problem, q, qd, tau, clear, turn, qdd=qdd, jerk=jerk, pace=pace)
-    return Between(weighted_sum(problem, ends_at, ends_at["secondary"]), clear, excess, running)
+    excess = limit_excess(
+        problem, q, qd, tau, clear.obstacles.bound, turn, own=clear.own.bound, qdd=qdd, jerk=jerk, pace=pace
+    )
+    return Between(weighted_sum(problem, ends_at, ends_at["secondary"]), excess, running)
 
 
 def tool_pace(
@@ -113,8 +114,11 @@ class Audit:
     worst: dict[str, tuple[int, int]]
 
 
-def audit(problem: Problem, time: Array, q: Array, qd: Array, qdd: Array, jerk: Array) -> Audit:
-    """Judge samples (K, n) that come with their own velocities, accelerations and jerks, at times (K,)."""
+def audit(problem: Problem, curve: Callable[..., Array], knots: Array, time: Array) -> Audit:
+    """Judge samples at times (K,) of `curve(moment, order)`, a cubic between `knots`; its clearance is that of all of
+    it.
+    """
+    q, qd, qdd, jerk = (curve(time, order) for order in range(4))
     plant, targets = SinglePlant(problem.task.arm), problem.reference.position(time)
     error, turned, way, tau = np.empty(len(time)), np.empty(len(time)), np.empty((len(time), 3, 3)), np.empty_like(q)
     pace = np.zeros((len(time), 2))
@@ -124,16 +128,17 @@ def audit(problem: Problem, time: Array, q: Array, qd: Array, qdd: Array, jerk: 
         tau[i], way[i] = plant.torque(qdd[i]), plant.base()[1]
         pace[i] = plant.pace(problem.task, qdd[i])
     turn = angle_between(plant.start, way)
-    clearance = Clearance(problem.task.arm, problem.obstacles)(q)
+    clear = near(problem, Clearance(problem.task.arm, problem.obstacles, problem.own), curve, knots)
     worst = {
         kind: tuple(int(place) for place in np.unravel_index(int(np.argmax(excess)), excess.shape))
         for kind, excess in excesses(problem, q, qd, tau, qdd, jerk).items()
     }
-    if problem.obstacles is not None:
-        worst["clearance"] = (int(np.argmin(clearance)), 0)
+    for kind, found in (("clearance", clear.obstacles), ("self_clearance", clear.own)):
+        if np.isfinite(found.bound):
+            worst[kind] = (int(np.abs(time - found.time).argmin()), 0)
     if np.isfinite(problem.bounds.attitude):
         worst["attitude"] = (int(np.argmax(turn)), 0)
     worst |= {kind: (int(np.argmax(excess)), 0) for kind, excess in of_tool(problem, pace).items()}
-    nearest, most = float(clearance.min()), float(turn.max())
-    excess = limit_excess(problem, q, qd, tau, nearest, most, qdd=qdd, jerk=jerk, pace=pace)
+    nearest, most = clear.obstacles.bound, float(turn.max())
+    excess = limit_excess(problem, q, qd, tau, nearest, most, own=clear.own.bound, qdd=qdd, jerk=jerk, pace=pace)
     return Audit(float(error.max()), float(turned.max()), excess, worst)  # type: ignore[arg-type]

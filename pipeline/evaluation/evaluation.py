@@ -15,12 +15,13 @@ from scipy.spatial.transform import Rotation
 from pipeline.common.arrays import Array
 from pipeline.evaluation.base import BaseMotion, angle_between, base_motion, entered_cycle
 from pipeline.evaluation.between import between_knots, tool_pace
+from pipeline.evaluation.certified import Near, near, said
 from pipeline.evaluation.clearance import Clearance
 from pipeline.evaluation.curve import OffPath, off_path
 from pipeline.evaluation.limits import LIMITS, limit_excess
 from pipeline.evaluation.plant import SinglePlant
 from pipeline.evaluation.sums import derivatives, running_integral, weighted_sum
-from pipeline.problem.curve import turns_of_cycle
+from pipeline.problem.curve import turns_of_cycle, whole
 from pipeline.problem.problem import Boundary, Problem
 from pipeline.problem.resolution import steps_needed, strays
 from pipeline.problem.solution import Solution, Status
@@ -60,7 +61,7 @@ class Evaluation:
     orientation_error_between: float
     on_path: bool  # whether both are within the tolerances of the path
     clearance: Array  # (N + 1,) [m] smallest distance of a moving link from an obstacle; infinite without obstacles
-    clearance_between: float  # smallest along that spline
+    near: Near  # what the curve that is exported comes nearest to, certified
     limit_excess: dict[str, float]  # by kind, at the knots, relative; see limit_excess()
     limit_excess_between: dict[str, float]  # the same along that spline
     base: BaseMotion
@@ -73,6 +74,11 @@ class Evaluation:
     def label(self) -> str:
         """`global`, `global 2`, ...: the method and, from the second on, its optimum."""
         return self.method if self.solution.optimum == 1 else f"{self.method} {self.solution.optimum}"
+
+    @property
+    def clearance_between(self) -> float:
+        """[m] What a moving link keeps from every obstacle along the curve that is exported, at least."""
+        return self.near.obstacles.bound
 
     @property
     def energy_integral(self) -> Array:
@@ -147,13 +153,15 @@ def evaluate(problem: Problem, solution: Solution) -> Evaluation:
     smooth = trajectory.ends is not None
     tau[0] = tau[0] if problem.boundary is Boundary.CYCLIC or smooth else 0.0
     position = skeleton[:, -1]
-    distances = Clearance(arm, problem.obstacles)
+    distances = Clearance(arm, problem.obstacles, problem.own)
     clearance = distances(q)
+    clear = near(problem, distances, whole(problem, trajectory), time) if np.all(np.isfinite(q)) else Near()
     turn = angle_between(plant.start, way)
+    own = own_at_knots(problem, distances, clear, q)
     pace = tool_pace(problem, plant, trajectory, position, (qd, qdd))
     nearest, most = float(clearance.min()), float(turn.max())
-    excess = limit_excess(problem, q, qd, tau, nearest, most, qdd=qdd, jerk=jerk, pace=pace)
-    between = between_knots(problem, plant, distances, trajectory, qd[0])
+    excess = limit_excess(problem, q, qd, tau, nearest, most, own=own, qdd=qdd, jerk=jerk, pace=pace)
+    between = between_knots(problem, plant, clear, trajectory, qd[0])
     off = off_path(problem, plant, trajectory)
     secondary = np.array([plant.secondary(problem, qi) for qi in q]) if problem.objective.secondary else np.zeros(count)
     moving = q
@@ -166,9 +174,12 @@ def evaluate(problem: Problem, solution: Solution) -> Evaluation:
 
     status, message = solution.status, solution.message
     if status in (Status.SOLVED, Status.SINGULAR):
-        status, message = _judge(moving, tracking, turned, between.limit_excess if smooth else excess, solution)
+        judged = between.limit_excess if smooth else excess
+        if solution.clear_between:
+            judged = judged | {kind: v for kind, v in between.limit_excess.items() if kind.endswith("clearance")}
+        status, message = _judge(moving, tracking, turned, judged, solution, clear)
     if status is Status.SOLVED:
-        status, message = _judge_between(problem, off, tracking, turned, solution)
+        status, message = _judge_between(problem, off, tracking, turned, solution, message)
     return Evaluation(
         solution=solution,
         status=status,
@@ -204,15 +215,23 @@ def evaluate(problem: Problem, solution: Solution) -> Evaluation:
             for error, allowed in zip((off.distance, off.angle), problem.reference.tolerances, strict=True)
         ),
         clearance=clearance,
-        clearance_between=between.clearance,
+        near=clear,
         limit_excess=excess,
         limit_excess_between=between.limit_excess,
         base=base,
     )
 
 
+def own_at_knots(problem: Problem, distances: Clearance, clear: Near, q: Array) -> float:
+    """The smallest distance [m] between links at the knots q (N + 1, n), where it is not enough between them too."""
+    own = problem.own
+    if own is None or not own.kept or clear.own.bound >= own.margin:
+        return clear.own.bound
+    return float(distances.smallest(distances.own, q).min())
+
+
 def _judge(
-    q: Array, tracking: Array, turned: Array, excess: dict[str, float], solution: Solution
+    q: Array, tracking: Array, turned: Array, excess: dict[str, float], solution: Solution, clear: Near
 ) -> tuple[Status, str]:
     promised = solution.trajectory.time <= solution.until
     if not np.all(np.isfinite(q[promised])):
@@ -227,17 +246,22 @@ def _judge(
             )
     for kind in solution.limits_kept:
         if excess.get(kind, 0.0) > LIMITS:
-            return Status.UNCONFIRMED, f"a {kind} limit is exceeded by {100 * excess[kind]:.2g} %"
-    return solution.status, solution.message
+            whose = {"clearance": clear.obstacles, "self_clearance": clear.own}.get(kind)
+            where = "" if whose is None else f" ({said(whose)})"
+            return Status.UNCONFIRMED, f"a {kind} limit is exceeded by {100 * excess[kind]:.2g} %{where}"
+    notes = [solution.message] if solution.message else []
+    if clear.own.bound < 0 and "self_clearance" not in solution.limits_kept:
+        notes.append(f"the arm collides with itself ({said(clear.own)})")
+    return solution.status, "; ".join(notes)
 
 
 def _judge_between(
-    problem: Problem, off: OffPath, tracking: Array, turned: Array, solution: Solution
+    problem: Problem, off: OffPath, tracking: Array, turned: Array, solution: Solution, message: str
 ) -> tuple[Status, str]:
     """The curve that is exported: between the knots it may be off by the tolerances of the path more than at them,
     where the method's own promise holds; and what there is to say of a cycle that winds.
     """
-    notes = [solution.message] if solution.message else []
+    notes = [message] if message else []
     reference, arm = problem.reference, problem.task.arm
     for which, (error, own, allowed, unit, key) in enumerate(
         (

@@ -19,18 +19,23 @@ def limit_excess(
     clearance: float = np.inf,
     turn: float = 0.0,
     *,
+    own: float = np.inf,
     qdd: Array = STILL,
     jerk: Array = STILL,
     pace: Array | None = None,
 ) -> dict[str, float]:
     """By how much each kind of limit is exceeded, relative to its size (positions: to half the range; clearances: to
-    the margin); <= 0 if kept. turn [rad]: of the base from its start; pace (K, 2): of the tool, [m/s] and [m/s^2].
+    the margin); <= 0 if kept. clearance, own [m]: from obstacles, of the arm from itself. turn [rad]: of the base from
+    its start; pace (K, 2): of the tool, [m/s] and [m/s^2].
     """
-    if not (problem.constrained or problem.bounds.limits_tool) or not np.all(np.isfinite(q)):
+    limited = problem.constrained or problem.keeps_clear or problem.bounds.limits_tool
+    if not limited or not np.all(np.isfinite(q)):
         return {}
     found = {kind: float(excess.max()) for kind, excess in excesses(problem, q, qd, tau, qdd, jerk).items()}
     if problem.obstacles is not None:
         found["clearance"] = 1 - clearance / problem.obstacles.margin
+    if problem.own is not None and problem.own.kept:
+        found["self_clearance"] = 1 - own / problem.own.margin
     if np.isfinite(problem.bounds.attitude):
         found["attitude"] = turn / problem.bounds.attitude - 1
     return found | {kind: float(excess.max()) for kind, excess in of_tool(problem, pace).items()}

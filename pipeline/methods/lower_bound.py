@@ -80,7 +80,7 @@ def solve(problem: Problem, options: LowerBoundOptions, context: Context) -> lis
             "lower_bound",
             Trajectory(knots, finished[0].q) if finished else Trajectory(times, best.q),
             Status.SOLVED,
-            sentence(intervals, best.cost, gap, first.cost),
+            sentence(intervals, best.cost, gap, first.cost, problem.task.arm.description.unit()),
             tracking_tolerance=TRACKING,
             knots_only=not finished,
             limits_kept=("position", "velocity"),
@@ -89,10 +89,10 @@ def solve(problem: Problem, options: LowerBoundOptions, context: Context) -> lis
     ]
 
 
-def sentence(intervals: int, cost: float, gap: float, from_roadmap: float) -> str:
+def sentence(intervals: int, cost: float, gap: float, from_roadmap: float, unit: str = "rad") -> str:
     """What a gap (relative) means, with its conditions; and whether the planner's starts led to the motion."""
     said = (
-        f"on {intervals} intervals no motion with joint steps below {LONGEST_STEP:g} rad costs more than "
+        f"on {intervals} intervals no motion with joint steps below {LONGEST_STEP:g} {unit} costs more than "
         f"{percent(gap)} less than this one does there, {cost:.5g}; numerical bound"
     )
     if cost < from_roadmap * (1 - SLACK):

@@ -40,8 +40,8 @@ class SingularityWatch:
     def lost(self, method: str, time: Array, q_init: Array, step: int) -> Solution:
         """None found, since the integration left all bounds at a step: the arm is held at its start (n,)."""
         message = (
-            f"diverged at t = {time[step]:.3g} s, where the joints are beyond {LOST:g} rad; smallest singular value "
-            f"{self.smallest:.1e} of the largest, at t = {self.time:.3g} s"
+            f"diverged at t = {time[step]:.3g} s, where the joints are beyond {LOST:g} rad or m; smallest singular "
+            f"value {self.smallest:.1e} of the largest, at t = {self.time:.3g} s"
         )
         held = Trajectory(time, np.repeat(q_init[None], len(time), axis=0))
         return Solution(method, held, Status.INFEASIBLE, message, found=False, grid=f"method.{method}.dt")

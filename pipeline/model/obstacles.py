@@ -16,3 +16,21 @@ class Obstacles:
     shapes: tuple[Shape, ...]
     margin: float
     influence: float = 0.05
+
+
+@dataclass(frozen=True)
+class Own:
+    """Pairs of the arm's links that may not touch, the least distance [m] between them, from how much farther on [m]
+    they are felt by the solver, and whether motions have to keep it: if not, it is reported all the same.
+
+    always: pairs that were left out since they touch in every sample; allowed: how many were since they may touch.
+    unknown: why nothing is known of any pair.
+    """
+
+    pairs: tuple[tuple[str, str], ...]
+    margin: float
+    influence: float = 0.05
+    kept: bool = True
+    always: tuple[tuple[str, str], ...] = ()
+    allowed: int = 0
+    unknown: str = ""

@@ -14,7 +14,7 @@ from pipeline.common.arrays import Array
 from pipeline.robot.description import Description
 from pipeline.robot.mounting import Mounting
 
-BLOCK = 16  # copies per plant: beyond this Drake's cost per knot no longer falls
+BLOCK = 25  # copies per plant: beyond this Drake's cost per knot no longer falls
 
 
 STEP = 1e-5  # central differences of smooth rigid-body functions: truncation and rounding balance near 1e-10

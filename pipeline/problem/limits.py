@@ -10,7 +10,7 @@ from pipeline.common.arrays import Array
 from pipeline.model.arm import Arm
 
 LIMIT_KINDS = (
-    *("position", "velocity", "acceleration", "jerk", "torque", "power", "clearance", "attitude"),
+    *("position", "velocity", "acceleration", "jerk", "torque", "power", "clearance", "self_clearance", "attitude"),
     *("tool_speed", "tool_acceleration"),
 )
 FREE = np.array(np.inf)

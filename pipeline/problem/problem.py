@@ -10,7 +10,7 @@ import numpy as np
 
 from pipeline.common.arrays import Array
 from pipeline.common.errors import InputError
-from pipeline.model.obstacles import Obstacles
+from pipeline.model.obstacles import Obstacles, Own
 from pipeline.model.task import Task
 from pipeline.path.reference import Reference
 from pipeline.problem.integrals import ByIntegral
@@ -36,6 +36,7 @@ class Problem:
     times: (N + 1,) [s] the knots of the grid on which a solution is wanted.
     bounds_of_integrals: upper bounds by the names in the catalogue (`integrals.py`), positive; an infinite one is none.
     qd_init: (n,) [rad/s] the velocity that a motion from q_init comes with; None: at rest, or as the path is entered.
+    own: the links that may not touch, None: nothing is to be known of them.
     rest: whether all joints rest at the start, at the end. zero_acceleration: whether they do not accelerate there.
     free_law: whether the law of the path is to be found, in the time of the one given; free_duration: whether the
     motion is to be as short as its limits allow. `reference` and `times` are then where the search begins.
@@ -50,6 +51,7 @@ class Problem:
     boundary: Boundary = Boundary.FIXED
     bounds_of_integrals: Mapping[str, float] = field(default_factory=dict)
     obstacles: Obstacles | None = None
+    own: Own | None = None
     qd_init: Array | None = None
     rest: tuple[bool, bool] = (False, False)
     zero_acceleration: bool = False
@@ -89,5 +91,10 @@ class Problem:
 
     @property
     def constrained(self) -> bool:
-        """Whether anything limits the motion besides its path."""
+        """Whether anything limits the motion besides its path and the arm itself."""
         return self.bounds.any or self.obstacles is not None
+
+    @property
+    def keeps_clear(self) -> bool:
+        """Whether the motion must keep clear of anything: of obstacles or of the arm itself."""
+        return self.obstacles is not None or (self.own is not None and self.own.kept)

@@ -52,8 +52,11 @@ class Solution:
     `tracking_tolerance` [m] is what the method promises to keep of the path at its knots, `until` a time [s] from which
     on a singular motion is not to be used; the evaluation checks it.
     `limits_kept` are the kinds of limits that it promises to keep at its knots.
+    `clear_between`: of those, clearances are promised along the whole curve.
     `knots_only`: it goes from node to node of a grid, and promises nothing of the path between its knots.
     `grid` is the key of the configuration that its knots come from.
+    `stretch` [m]: the part of the path that it follows, if not all; `approach`: the motion through joint space from
+    the part before, from rest to rest, its times from 0 on.
     `evidence`: what speaks for the motion, in words: how it was found and what confirms it.
     `reference`: the path with the law that was found for it; None: it is the problem's.
     `found` is False where there is no motion to speak of: the trajectory then only holds the arm at its start.
@@ -68,11 +71,14 @@ class Solution:
     tracking_tolerance: float = np.inf
     until: float = np.inf
     limits_kept: tuple[str, ...] = ()
+    clear_between: bool = False
     found: bool = True
     knots_only: bool = False
     grid: str = "timing.steps"
     evidence: str = ""
     reference: Reference | None = None
+    stretch: tuple[float, float] | None = None
+    approach: Trajectory | None = None
     statistics: dict[str, Any] = field(default_factory=dict)
 
     def posed(self, problem: Problem) -> Problem:

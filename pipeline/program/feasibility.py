@@ -7,16 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.common.arrays import Array
-from pipeline.model.arm import Arm
 from pipeline.model.clearance import Clearance
-from pipeline.model.obstacles import Obstacles
 from pipeline.problem.costs import integrals, velocities
 from pipeline.problem.problem import Problem
 from pipeline.program.transcription import transcribe
 
 UNITS = {
     **{"position": "rad", "velocity": "rad/s", "acceleration": "rad/s^2", "jerk": "rad/s^3"},
-    **{"torque": "N m", "power": "W", "clearance": "m", "attitude": "rad"},
+    **{"torque": "N m", "power": "W", "clearance": "m", "self_clearance": "m", "attitude": "rad"},
     **{"tolerance": "m", "orientation_tolerance": "rad", "tool_speed": "m/s", "tool_acceleration": "m/s^2"},
 }
 
@@ -59,8 +57,8 @@ def violations(problem: Problem, times: Array, q: Array) -> list[Violation]:
     ):
         found.append(_worst(kind, names, times, values, bound, bound, 1.0))
     found.append(_turned(problem, times, q))
-    if problem.obstacles is not None:
-        found.append(_closest(problem.task.arm, problem.obstacles, times, q))
+    if problem.keeps_clear:
+        found += _closest(problem, times, q)
     return [violation for violation in found if violation is not None]
 
 
@@ -75,13 +73,14 @@ def _turned(problem: Problem, times: Array, q: Array) -> Violation | None:
     )
 
 
-def _closest(arm: Arm, obstacles: Obstacles, times: Array, q: Array) -> Violation:
-    clearance = Clearance(arm, obstacles)
-    closest = [clearance.closest(one) for one in q]
-    knot = int(np.argmin([distance for distance, _, _ in closest]))
-    distance, link, obstacle = closest[knot]
-    excess = (obstacles.margin - distance) / obstacles.margin
-    return Violation("clearance", f"{link} from {obstacle}", obstacles.margin, distance, float(times[knot]), excess)
+def _closest(problem: Problem, times: Array, q: Array) -> list[Violation]:
+    clearance, found = Clearance(problem.task.arm, problem.obstacles, problem.own), []
+    for of_kind in zip(*map(clearance.closest, q), strict=True):
+        knot = int(np.argmin([close.distance for close in of_kind]))
+        close = of_kind[knot]
+        excess, whose = (close.margin - close.distance) / close.margin, f"{close.first} from {close.second}"
+        found.append(Violation(close.kind, whose, close.margin, close.distance, float(times[knot]), excess))
+    return found
 
 
 def _worst(

@@ -47,7 +47,7 @@ class Plain(Lifted):
             or problem.task.arm.base.count
             or problem.objective.secondary is not None
             or problem.bounds_of_integrals
-            or problem.obstacles is not None
+            or problem.keeps_clear
             or np.isfinite(bounds.velocity).any()
         )
 

@@ -6,6 +6,7 @@ It knows none of its terms (`terms/`); `transcription.py` puts them together and
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
+from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
@@ -18,10 +19,11 @@ from pipeline.problem.lagrangian import Lagrangian
 from pipeline.problem.problem import Boundary, Problem
 from pipeline.program import ipopt
 from pipeline.program.differentiable import DifferentiableConstraint, DifferentiableCost
+from pipeline.program.residuals import Conditions
 from pipeline.program.scaling import POSITION_SCALE, Guess, Scaling, Sums, lifted, scale
 
 KNOTS_PER_BINDING = 10  # a Python binding pays for its size squared: more, smaller bindings are cheaper up to a point
-POSITIONS_PER_BINDING = 20  # of knots whose positions alone it takes
+POSITIONS_PER_BINDING = 25  # of knots whose positions alone it takes
 
 
 Block = NDArray[np.int_]
@@ -47,8 +49,7 @@ class Lifted:
 
     scaling: Scaling
     guess: Positions
-    stations: NDArray[Any]  # (S, n) unknowns: the positions at which the energy is summed up
-    w: NDArray[Any]  # (S, n) the velocities there, scaled
+    w: NDArray[Any]  # (S, n) the velocities at the stations where the energy is summed up, scaled
     weights: Array  # (S,) [s] of that sum
     left_out: tuple[int, ...] = ()  # knots at which the path is not asked for
     tube: Array  # (N + 1, 2) the shares of the path's tolerances by which it may be left at the knots, if it may
@@ -121,6 +122,14 @@ class Lifted:
         # IPOPT linearises every row once per iteration: any of them can tell how many there were.
         return outcome, self._rows[0].iterations
 
+    def residuals(self, outcome: ipopt.Outcome) -> tuple[float, float]:
+        """Violation and optimality that IPOPT has left (`residuals.py`)."""
+        return self._conditions.residuals(outcome.result)
+
+    @cached_property
+    def _conditions(self) -> Conditions:
+        return Conditions(self.drake, self.functions)
+
     def read(self, outcome: ipopt.Outcome, unknowns: NDArray[Any]) -> Array:
         """The values of unknowns in an outcome, in their shape."""
         found: Array = outcome.x[self.drake.FindDecisionVariableIndices(unknowns.ravel())]
@@ -140,7 +149,7 @@ class Program(Lifted):
         sums = Sums(guess[1:], self.dt, self.guess.costs.tau[1:], self.dt)
         self.scaling = scale(problem, sums, self.guess.costs, self.forces)
         self.w = self.new("w", self.scaling.to_w(self.guess.qd[1:]))
-        self.stations, self.weights = self.y[1:], self.dt
+        self.weights = self.dt
 
     def solve(self, **options: Any) -> tuple[Array, ipopt.Outcome, int]:
         """Solve from the guess: positions (N + 1, n) [rad], IPOPT's outcome, its iterations."""

@@ -30,8 +30,8 @@ class Description:
 
     xml: the reduced URDF. joints: names of the n moving joints, base to tip. revolute: (n,) whether a joint turns.
     lower, upper: (n,) position limits [rad or m]. velocity: (n,) [rad/s or m/s]. effort: (n,) [N m or N].
-    A limit that the file does not state is infinite. collision: primitive shapes of links. meshes: links that have
-    collision meshes instead, which are not used. pictures: file names of visual meshes. held: joints that are locked.
+    A limit that the file does not state is infinite. collision: the shapes of links. pictures: file names of visual
+    meshes. held: joints that are locked.
     notes: what was read otherwise than it stands in the file, one line each. root_fault: why no body has the inertia of
     the root link, empty if one can.
     base_coordinates: how many of the joints, the first ones, are not the arm's but move its base (`spacecraft.py`), and
@@ -51,7 +51,6 @@ class Description:
     effort: Array
     links: tuple[str, ...] = ()
     collision: tuple[Shape, ...] = ()
-    meshes: tuple[str, ...] = ()
     pictures: tuple[str, ...] = ()
     held: tuple[Held, ...] = ()
     notes: tuple[str, ...] = ()
@@ -68,6 +67,11 @@ class Description:
     def turning(self) -> NDArray[np.bool_]:
         """Which of the arm's own joints turn."""
         return self.revolute[self.base_coordinates :]
+
+    def unit(self, joint: int | None = None) -> str:
+        """Of the position of one of the arm's own joints; of all of them where none is given."""
+        turns = self.turning if joint is None else self.turning[[joint]]
+        return "rad" if turns.all() else "rad or m" if turns.any() else "m"
 
     @cached_property
     def for_drake(self) -> tuple[str, str]:

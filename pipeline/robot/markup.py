@@ -11,8 +11,8 @@ from pipeline.common.errors import RobotError
 DEEPEST = 100  # elements within elements: no robot has more, and what walks the tree is recursive
 
 
-def parse(data: bytes, file: Path) -> ET.Element:
-    """The root element of `data`; raises RobotError, one line, which names `file`."""
+def parse(data: bytes, file: Path, key: str = "robot.urdf") -> ET.Element:
+    """The root element of `data`; raises RobotError, one line, which names `key` and `file`."""
     builder, depth = ET.TreeBuilder(), 0
     parser = expat.ParserCreate()
     parser.buffer_text = True
@@ -21,7 +21,7 @@ def parse(data: bytes, file: Path) -> ET.Element:
         nonlocal depth
         depth += 1
         if depth > DEEPEST:
-            raise RobotError(f"robot.urdf = {file}: more than {DEEPEST} elements within one another")
+            raise RobotError(f"{key} = {file}: more than {DEEPEST} elements within one another")
         builder.start(tag, attributes)
 
     def end(tag: str) -> None:
@@ -35,7 +35,7 @@ def parse(data: bytes, file: Path) -> ET.Element:
     try:
         parser.Parse(data.lstrip(b" \t\r\n"), True)
     except (expat.ExpatError, LookupError, ValueError) as error:  # ValueError: an encoding of several bytes
-        raise RobotError(f"robot.urdf = {file}: not well-formed XML ({error})") from None
+        raise RobotError(f"{key} = {file}: not well-formed XML ({error})") from None
     return builder.close()
 
 

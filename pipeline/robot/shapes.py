@@ -1,23 +1,28 @@
-"""Solid shapes for clearances: spheres, boxes and capsules, of the arm's links and of obstacles."""
+"""Solid shapes for clearances, all of them convex: of the arm's links and of obstacles."""
 
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from pipeline.common.arrays import Array
 from pipeline.common.errors import RobotError
+from pipeline.robot import meshes
 from pipeline.robot.numbers import Vector, numbers, shown
+from pipeline.robot.packages import resolve
 
-# How URDF calls them, what they become, and the attributes that give their sizes.
+CORNERS = np.stack(np.meshgrid(*[(-0.5, 0.5)] * 3), axis=-1).reshape(-1, 3)  # of the unit box
+
+# The attributes that give their sizes in a URDF.
 SIZES = {
-    "sphere": ("sphere", ("radius",)),
-    "box": ("box", ("size",)),
-    "cylinder": ("capsule", ("radius", "length")),
-    "capsule": ("capsule", ("radius", "length")),
+    "sphere": ("radius",),
+    "box": ("size",),
+    "cylinder": ("radius", "length"),
+    "capsule": ("radius", "length"),
 }
 
 
@@ -25,8 +30,10 @@ SIZES = {
 class Shape:
     """One solid in a frame: `frame` is a link, or None for the world.
 
-    kind: sphere, box or capsule. size: (radius,), the edges (x, y, z), or (radius, length between the centres of the
-    caps), the capsule lying along its z axis [m]. position (3,) [m], rotation: rotation vector (3,) [rad] in the frame.
+    kind: sphere, box, capsule, cylinder or mesh. size: (radius,), the edges (x, y, z), (radius, length) along the z
+    axis, which of a capsule is that between the centres of its caps, or the scale (x, y, z) of a mesh [m].
+    position (3,) [m], rotation: rotation vector (3,) [rad] in the frame. file: of a mesh, which is read where its
+    points are asked for; of that the convex hull counts.
     """
 
     name: str
@@ -35,6 +42,24 @@ class Shape:
     position: tuple[float, ...]
     rotation: tuple[float, ...] = (0.0, 0.0, 0.0)
     frame: str | None = None
+    file: str = ""
+
+    @property
+    def points(self) -> Array:
+        """The corners (V, 3) [m] of a box or of a mesh's hull, in the shape's own frame; raises RobotError, which
+        names whose it is, for a mesh that cannot be read.
+        """
+        if self.kind == "box":
+            return CORNERS * np.array(self.size)
+        try:
+            return np.asarray(meshes.hull(self.file) * np.array(self.size))
+        except RobotError as error:
+            whose = f"obstacles.shapes.{self.name}" if self.frame is None else f"link '{self.frame}'"
+            raise RobotError(f"{whose}: {error}") from None
+
+    def placed(self, points: Array) -> Array:
+        """Points (V, 3) of its own frame in the frame that it stands in."""
+        return np.asarray(Rotation.from_rotvec(self.rotation).apply(points) + np.array(self.position))
 
 
 def capsule(name: str, start: Array, end: Array, radius: float, frame: str | None = None) -> Shape:
@@ -48,13 +73,13 @@ def capsule(name: str, start: Array, end: Array, radius: float, frame: str | Non
     return Shape(name, "capsule", (radius, length), middle, tuple(map(float, turn)), frame)
 
 
-def link_shapes(robot: ET.Element, where: str = "robot") -> tuple[list[Shape], list[str]]:
-    """The primitive collision shapes of a URDF's links, and the names of links that have meshes instead.
+def link_shapes(robot: ET.Element, where: str = "robot", beside: Path | None = None) -> list[Shape]:
+    """The collision shapes of a URDF's links. Meshes are not read: that one is there is not known.
 
-    A cylinder becomes the capsule that holds it: its distance is smooth, and never overestimates the clearance.
-    Raises RobotError, which begins with `where`, for what is no number.
+    beside: the folder that the names of meshes may start from. Raises RobotError, which begins with `where`, for what
+    is no number.
     """
-    shapes, meshes = [], []
+    shapes = []
     for link in robot.findall("link"):
         name = link.get("name", "")
         for count, collision in enumerate(link.findall("collision")):
@@ -65,18 +90,23 @@ def link_shapes(robot: ET.Element, where: str = "robot") -> tuple[list[Shape], l
             values = {} if origin is None else origin.attrib
             position = numbers(values.get("xyz", "0 0 0"), 3, f"{what} origin xyz")
             rotation = Rotation.from_euler("xyz", numbers(values.get("rpy", "0 0 0"), 3, f"{what} origin rpy"))
+            turn = tuple(map(float, rotation.as_rotvec()))
             for child in solid:
-                if child.tag not in SIZES:
-                    meshes.append(name)
-                    continue
-                kind, keys = SIZES[child.tag]
-                size: Vector = ()
-                for key in keys:
-                    text, place = child.get(key, ""), f"{what} {child.tag} {key}"
-                    size += numbers(text, 3 if kind == "box" else 1, place)
-                    if min(size) < 0:
-                        raise RobotError(f"{place} '{shown(text)}', expected no negative number")
-                if min(size) > 0:
-                    turn = tuple(map(float, rotation.as_rotvec()))
-                    shapes.append(Shape(f"{name}_{count}", kind, size, position, turn, name))
-    return shapes, sorted(set(meshes))
+                own = f"{name}_{count}"
+                if child.tag == "mesh":
+                    scale = numbers(child.get("scale", "1 1 1"), 3, f"{what} mesh scale")
+                    file = meshes.named(child.get("filename", ""), resolve(child.get("filename", ""), beside))
+                    shapes.append(Shape(own, "mesh", scale, position, turn, name, file))
+                elif child.tag in SIZES and min(size := _size(child, what)) > 0:
+                    shapes.append(Shape(own, child.tag, size, position, turn, name))
+    return shapes
+
+
+def _size(child: ET.Element, what: str) -> Vector:
+    size: Vector = ()
+    for key in SIZES[child.tag]:
+        text, place = child.get(key, ""), f"{what} {child.tag} {key}"
+        size += numbers(text, 3 if child.tag == "box" else 1, place)
+        if min(size) < 0:
+            raise RobotError(f"{place} '{shown(text)}', expected no negative number")
+    return size

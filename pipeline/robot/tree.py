@@ -93,7 +93,6 @@ class Tree:
     links: dict[str, Link] = field(default_factory=dict)
     joints: dict[str, Joint] = field(default_factory=dict)
     shapes: list[Shape] = field(default_factory=list)
-    meshes: list[str] = field(default_factory=list)
     pictures: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 

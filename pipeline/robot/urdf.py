@@ -1,7 +1,8 @@
 """The arm of a robot file (URDF, SDF or MJCF): read, checked, and reduced to the chain that moves, as a URDF for Drake.
 
-Only the dynamics are kept: pictures, meshes, transmissions and simulator tags are dropped, so that a missing mesh
-does not matter. Every joint off the chain from base to end effector becomes rigid at its given (or zero) position.
+Only what moves and what touches is kept: pictures, transmissions and simulator tags are dropped, so that a missing
+picture does not matter; the mesh of a collision shape is read where that shape is used. Every joint off the chain from
+base to end effector becomes rigid at its given (or zero) position.
 What Drake gets is written from the numbers that were checked, never from the text of the file.
 """
 
@@ -94,7 +95,6 @@ def read(
         effort=effort,
         links=tuple(tree.links),
         collision=tuple(tree.shapes),
-        meshes=tuple(tree.meshes),
         pictures=tuple(tree.pictures),
         held=held,
         notes=tuple(tree.notes),

@@ -9,17 +9,18 @@ import os
 import sys
 from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
+from typing import Any
 
 import hydra
 from hydra.core.hydra_config import HydraConfig
 from hydra.types import RunMode
-from omegaconf import DictConfig
+from omegaconf import DictConfig, OmegaConf
 
 from pipeline.common.errors import OutputError
 from pipeline.common.files import shipped
 from pipeline.config.as_written import keep_as_written
 from pipeline.config.unfolding import bound_files, bounded
-from pipeline.run import completion, ownership, session
+from pipeline.run import completion, own_robot, ownership, session
 from pipeline.run.failures import foreseen, leaves, told, where
 from pipeline.run.refusals import refuse
 from pipeline.run.termination import terminable
@@ -69,13 +70,30 @@ def job(values: DictConfig) -> int:
     return code
 
 
+def answer(values: DictConfig) -> int | float | list[float]:
+    """The job, with what a sweeper hears of it: the exit code, or the numbers that `sweep.objective` chooses."""
+    code, asked = job(values), OmegaConf.select(values, "sweep.objective")
+    if asked is None or HydraConfig.get().mode is not RunMode.MULTIRUN:
+        return code
+    from pipeline.run.objective import numbers
+
+    def listed(value: Any) -> list[str]:
+        """A word or a list of them; of an enumeration the name alone."""
+        several = [value] if not OmegaConf.is_list(value) else list(value)
+        return [getattr(one, "name", str(one)) for one in several]
+
+    folder, goals = Path(HydraConfig.get().runtime.output_dir), HydraConfig.get().sweeper.get("direction", "minimize")
+    found = numbers(folder, listed(asked), listed(goals))
+    return found[0] if len(found) == 1 else found
+
+
 def main() -> int:
     """Runs and sweeps."""
-    return run_job(job)
+    return run_job(answer)
 
 
 def run_job(
-    job: Callable[[DictConfig], int],
+    job: Callable[[DictConfig], object],
     overrides: Sequence[str] = (),
     command: str = "python -m pipeline",
     asks_for: Collection[str] = (),
@@ -90,13 +108,17 @@ def run_job(
     if completion.installs(asked):
         print(completion.BASH)
         return 0
-    if not completion.completes(asked):
-        sys.argv[1:1] = overrides
+    completes = completion.completes(asked)
     # Hydra then hands its errors to us instead of printing pages and leaving with 1.
     os.environ["HYDRA_FULL_ERROR"] = "1"
     try:
         with terminable(), bounded():
             refuse(asked)
+            if not completes:
+                words, line = own_robot.words(asked)
+                sys.argv[1:1] = [*overrides, *words]
+                if line:
+                    print(line, flush=True)
             keep_as_written()
             bound_files()
             hydra.main(version_base="1.3", config_path=CONF, config_name="config")(job)()

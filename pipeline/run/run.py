@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from pipeline.evaluation.evaluation import evaluate
 from pipeline.methods.method import Context
 from pipeline.run import resume
 from pipeline.run.console import Console
+from pipeline.run.hints import hints
 from pipeline.run.solve import solve
 from pipeline.run.stages import Stages
 from pipeline.run.state import state
@@ -31,11 +33,14 @@ def run(config: RunConfig, folder: Path) -> int:
         problem, made = state(config), facts(config)
         workers = Workers(config.parallel.workers, folder / UNFINISHED, config.parallel.address, config.parallel.wait)
         workers.check()
+    for line in hints(config, problem):
+        print(f"hint: {line}", file=sys.stderr)
     with stages("solve"), console.progress(config.name) as (progress, phase):
         solutions, seconds = solve(problem, config, Context(config.seed, workers, progress, phase))
     console.phase(config.name, "evaluating")
     with stages("evaluate"):
-        problem = solutions[0].posed(problem)  # where its timing was to be found, with that of the best
+        if solutions[0].stretch is None:  # where its timing was to be found, with that of the best
+            problem = solutions[0].posed(problem)
         motions = Motions(config, problem, [evaluate(problem, solution) for solution in solutions], workers)
     with stages("studies"):
         results = tuple(result for study in STUDIES if (result := study(motions)) is not None)

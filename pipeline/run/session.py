@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import shutil
 import sys
 import uuid
 from collections.abc import Iterator
@@ -45,6 +44,7 @@ class Session(Callback):
         with _refusing():
             folder = _given(config, "hydra.run.dir")
             asked = checked(config)
+            print(f"{asked.name}: preparing", flush=True)  # what follows loads Drake
             self.check(asked)
             resume.refuse_another(folder, asked)
             ownership.own(folder)
@@ -56,10 +56,17 @@ class Session(Callback):
         from pipeline.run.unused import require_motion
 
         require_motion(asked)
-        if asked.artifacts.animation == "mp4" and shutil.which("ffmpeg") is None:
-            raise ConfigError("artifacts.animation = mp4: needs the program ffmpeg; gif needs none")
+        if asked.artifacts.animation == "mp4":
+            self.require_ffmpeg()
         keep(asked)
         Workers(address=asked.parallel.address).check()
+
+    def require_ffmpeg(self) -> None:
+        """Raise ConfigError where there is none: not after the run."""
+        from pipeline.artifacts.animation import ffmpeg
+
+        if ffmpeg() is None:
+            raise ConfigError("artifacts.animation = mp4: needs ffmpeg: pip install '.[film]'; gif needs none")
 
     def on_multirun_start(self, config: DictConfig, **_: Any) -> None:
         self.sweep = uuid.uuid4().hex

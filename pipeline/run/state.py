@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pipeline.artifacts import motion_files
 from pipeline.build.problem import prepare
 from pipeline.common.errors import ConfigError
 from pipeline.config.run import RunConfig
@@ -36,5 +37,7 @@ def state(config: RunConfig) -> Problem:
             served = [m.name for m in METHODS.values() if not m.why_not(problem, config.method.of(m.name))]
             raise ConfigError(f"{why}; methods that serve this problem: {', '.join(served)}")
     if config.control.run and (why := control.why_not(problem, config.method.pmke, config.control)):
+        raise ConfigError(why)
+    if why := motion_files.why_not(config.export.format, problem.task.arm.description.turning.tolist()):
         raise ConfigError(why)
     return problem

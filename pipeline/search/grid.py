@@ -126,9 +126,8 @@ def make_grid(problem: Problem, times: Array, nodes: int, velocity_slack: float 
     turns = np.floor((flat - lowest + 1e-9) / (2 * np.pi))
     flat = flat - np.where(held, 2 * np.pi * turns, 0.0)
     within = np.all(turning | ((flat <= bounds.upper + 1e-9) & (flat >= bounds.lower - 1e-9)), axis=1)
-    if problem.obstacles is not None:
-        clearance = Clearance(task.arm, problem.obstacles)
-        within &= clearance.smallest(flat) >= problem.obstacles.margin
+    if problem.keeps_clear:
+        within[within] = Clearance(task.arm, problem.obstacles, problem.own).clear(flat[within])
     lagrangian = Lagrangian(task, problem.objective)
     root, gain = np.linalg.cholesky(lagrangian.metric(flat)), lagrangian.gain(flat)[0]
     ends = np.cumsum([len(of_knot) for of_knot in q])[:-1]

@@ -37,7 +37,8 @@ class Manifold:
         self.inertia, self.norm = objective.weight("kinetic_energy"), objective.weight("velocity_norm")
         if not self.inertia and not self.norm:
             self.inertia = 1.0
-        self.clearance = None if problem.obstacles is None else Clearance(problem.task.arm, problem.obstacles)
+        around = problem.obstacles, problem.own
+        self.clearance = Clearance(problem.task.arm, *around) if problem.keeps_clear else None
 
     def wrap(self, difference: Array) -> Array:
         """Differences (..., n) by the shorter way round."""
@@ -69,8 +70,7 @@ class Manifold:
         """(K,): within position limits, and clear of obstacles and of the arm itself."""
         inside = np.all((q >= self.lower - INSIDE) & (q <= self.upper + INSIDE), axis=1)
         if self.clearance is not None and inside.any():
-            assert self.problem.obstacles is not None
-            inside[inside] = self.clearance.smallest(q[inside]) >= self.problem.obstacles.margin
+            inside[inside] = self.clearance.clear(q[inside])
         return np.asarray(inside)
 
     def project(

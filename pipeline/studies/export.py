@@ -115,6 +115,8 @@ class Nothing(Result):
 def study(motions: Motions) -> Result | None:
     """The motion that is to be exported, resampled; None if none is asked for, or the method asked for has none."""
     asked = motions.config.export.method
+    if any(e.solution.stretch is not None for e in motions.evaluations) and motions.methods == {"segments"}:
+        return None  # pieces are sent with their transits (`pieces.py`)
     sent, refused = _sent(motions)
     if sent is not None:
         return sent[1]
@@ -154,7 +156,10 @@ def _sent(motions: Motions) -> tuple[tuple[Evaluation, Resampled] | None, tuple[
     """
     config = motions.config.export
     refused: list[Resampled] = []
-    good = sorted((e for e in motions.solved if config.method in ("best", e.method)), key=lambda e: e.objective)
+    good = sorted(
+        (e for e in motions.solved if e.solution.stretch is None and config.method in ("best", e.method)),
+        key=lambda e: e.objective,
+    )
     for motion in good:
         found = resample(motion.solution.posed(motions.problem), motion, config.rate)
         if not found.faults:
@@ -173,7 +178,7 @@ def resample(problem: Problem, evaluation: Evaluation, rate: float) -> Resampled
     knots = evaluation.time
     fine = np.interp(np.arange(BETWEEN * (len(knots) - 1) + 1) / BETWEEN, np.arange(len(knots)), knots)
     judged = np.union1d(time, fine)  # a slow rate must not hide what happens between its samples
-    checked = audit(problem, judged, everything(judged), *(everything(judged, order) for order in (1, 2, 3)))
+    checked = audit(problem, everything, knots, judged)
     names = problem.task.arm.description.joints
     worst = {kind: (float(judged[row]), names[joint]) for kind, (row, joint) in checked.worst.items()}
     return Resampled(
@@ -196,21 +201,23 @@ def _faults(
     problem: Problem, evaluation: Evaluation, checked: Audit, worst: Mapping[str, tuple[float, str]]
 ) -> list[str]:
     """Why a motion cannot be sent, as the rest of a sentence that begins with its name."""
-    faults, reference, names = [], problem.reference, problem.task.arm.description.actuated
+    faults, reference, description = [], problem.reference, problem.task.arm.description
+    names = description.actuated
     speeds, most = np.abs(end_speeds(problem, evaluation.solution.trajectory)), float(np.abs(evaluation.qd).max())
     for speed, said in zip(speeds, ("starts with a jump of velocity", "ends while it moves"), strict=True):
         joint = int(speed.argmax())
         if speed[joint] > RESTS * most:
-            faults.append(f"{said} ({names[joint]} at {speed[joint]:.3g} rad/s)")
+            faults.append(f"{said} ({names[joint]} at {speed[joint]:.3g} {description.unit(joint)}/s)")
     joints = evaluation.q
     if problem.boundary is Boundary.CYCLIC and turns_of_cycle(problem, joints) is None:
         apart = np.abs(joints[-1] - joints[0] - full_turns(problem, joints[0], joints[-1]))
         joint = int(apart.argmax())
-        faults.append(f"is no cycle ({names[joint]} ends {apart[joint]:.3g} rad from where it began)")
+        gap = f"{apart[joint]:.3g} {description.unit(joint)}"
+        faults.append(f"is no cycle ({names[joint]} ends {gap} from where it began)")
     for kind, excess in checked.limit_excess.items():
         if excess > TOLERANCE:
             time, joint_name = worst[kind]
-            whose = f" of {joint_name}" if kind != "clearance" else ""
+            whose = "" if kind.endswith("clearance") else f" of {joint_name}"
             faults.append(f"exceeds the {kind} limit{whose} by {100 * excess:.3g} % at t = {time:.3g} s")
     for error, allowed, unit, key in (
         (checked.tracking_error, reference.tolerance, "m", "tolerance"),

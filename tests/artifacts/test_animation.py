@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -35,3 +36,13 @@ def test_the_film_moves(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None
 def test_none_is_made_that_nobody_asked_for(tmp_path: Path) -> None:
     animation.write(three_motions(), tmp_path)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_the_program_that_makes_a_film(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """The system's, else the one that a package brings."""
+    monkeypatch.setattr(animation.shutil, "which", lambda _: "/somewhere/ffmpeg")
+    assert animation.ffmpeg() == "/somewhere/ffmpeg"
+    monkeypatch.setattr(animation.shutil, "which", lambda _: None)
+    assert Path(str(animation.ffmpeg())).is_file()
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    assert animation.ffmpeg() is None

@@ -260,10 +260,11 @@ SOLIDS = [
     Shape("ball", "sphere", (0.05,), (0.3, 0.2, 0.1)),
     Shape("box", "box", (0.1, 0.2, 0.3), (0.3, 0.2, 0.1), (0.3, -0.2, 0.5)),
     capsule("rod", np.array([0.1, 0.2, 0.0]), np.array([0.3, 0.2, 0.4]), 0.03),
+    Shape("can", "cylinder", (0.05, 0.2), (0.3, 0.2, 0.1), (0.3, -0.2, 0.5)),
 ]
 
 
-@pytest.mark.parametrize(("solid", "volume"), [*zip(SOLIDS, [5.236e-4, 6e-3, 1.3776e-3], strict=True)])
+@pytest.mark.parametrize(("solid", "volume"), [*zip(SOLIDS, [5.236e-4, 6e-3, 1.3776e-3, 1.5708e-3], strict=True)])
 def test_an_obstacle_is_as_large_as_it_is(solid: Shape, volume: float) -> None:
     hull = ConvexHull(solids.surface(solid))
     assert hull.volume == pytest.approx(volume, rel=0.05)

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +23,7 @@ def motion() -> Resampled:
 
 
 def test_the_table(motion: Resampled, tmp_path: Path) -> None:
-    export.save(tmp_path, motion, JOINTS, "base")
+    export.save_motion(tmp_path, motion, JOINTS, "base")
     table = pd.read_csv(tmp_path / "motion.csv")
     kinds = ("position", "velocity", "acceleration")
     assert list(table.columns) == ["time", *(f"{joint}_{kind}" for kind in kinds for joint in JOINTS)]
@@ -32,7 +33,7 @@ def test_the_table(motion: Resampled, tmp_path: Path) -> None:
 
 def test_the_message_of_ros(motion: Resampled, tmp_path: Path) -> None:
     """The fields of trajectory_msgs/JointTrajectory and of its points, neither more nor fewer."""
-    export.save(tmp_path, motion, JOINTS, "base")
+    export.save_motion(tmp_path, motion, JOINTS, "base")
     message = json.loads((tmp_path / "motion.json").read_text(encoding="utf-8"))
     assert yaml.safe_load((tmp_path / "motion.yaml").read_text(encoding="utf-8")) == message
     assert list(message) == ["header", "joint_names", "points"]
@@ -53,3 +54,31 @@ def test_a_time_just_below_a_second_is_that_second(motion: Resampled) -> None:
     late = Resampled("global", 1, np.array([0.9999999999]), motion.q[:1], motion.qd[:1], motion.qdd[:1], 0, 0, {}, {})
     (point,) = export.joint_trajectory(late, JOINTS, "base")["points"]
     assert point["time_from_start"] == {"sec": 1, "nanosec": 0}
+
+
+def test_moveit_and_universal_robots(motion: Resampled, tmp_path: Path) -> None:
+    """A RobotTrajectory around the same message; a program that begins where the motion does and takes its time."""
+    export.save_motion(tmp_path, motion, JOINTS, "base", ["moveit", "urscript"])
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["motion.script", "motion_moveit.yaml"]
+    text = (tmp_path / "motion_moveit.yaml").read_text(encoding="utf-8")
+    message = yaml.safe_load(text)
+    assert message["joint_trajectory"] == export.joint_trajectory(motion, JOINTS, "base")
+    assert message["multi_dof_joint_trajectory"] == {
+        "header": message["joint_trajectory"]["header"],
+        "joint_names": [],
+        "points": [],
+    }
+    assert "&" not in text
+    program = (tmp_path / "motion.script").read_text(encoding="utf-8")
+    rows = re.findall(r"servoj\(\[(.*?)\], t=([\d.e-]+),", program)
+    np.testing.assert_allclose([[float(v) for v in row.split(",")] for row, _ in rows], motion.q[1:], rtol=1e-8)
+    np.testing.assert_allclose([float(step) for _, step in rows], np.diff(TIME), rtol=1e-5)
+    (start,) = re.findall(r"start = \[(.*?)\]", program)
+    np.testing.assert_allclose([float(v) for v in start.split(",")], motion.q[0], rtol=1e-8)
+
+
+def test_other_arms_are_not_universal_robots() -> None:
+    assert export.why_not(["csv", "urscript"], [True] * 6) is None
+    assert export.why_not(["csv", "moveit"], [True, False]) is None
+    assert "1 that turn and 1 that slide" in str(export.why_not(["urscript"], [True, False]))
+    assert export.why_not(["urscript"], [True] * 5 + [False]) is not None

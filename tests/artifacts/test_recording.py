@@ -19,7 +19,7 @@ import rerun as rr
 from rerun.chunk import RrdReader
 from rerun.experimental import ViewerClient
 
-from pipeline.artifacts.recording import blueprint, recording
+from pipeline.artifacts.recording import blueprint, bounds, recording
 from pipeline.artifacts.recording.arm import _rigid
 from pipeline.config.methods import GlobalOptions, LsvOptions
 from pipeline.evaluation.evaluation import Evaluation, evaluate
@@ -125,17 +125,26 @@ def test_the_pictures_and_facts_are_there(case: Case, tmp_path: Path) -> None:
     assert component(file, "/__properties", "RecordingInfo:name") == ["line"]
 
 
+def tetrahedron(file: Path) -> Path:
+    """An OBJ file with four corners."""
+    corners = "v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nv 0 0 0.1\n"
+    file.write_text(f"{corners}f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n", encoding="utf-8")
+    return file
+
+
 def test_obstacles_are_drawn(case: Case, tmp_path: Path) -> None:
     """As solids, and in the view from above as outlines."""
     solids = (
         Shape("ball", "sphere", (0.05,), (0.3, 0.2, 0.1)),
         Shape("box", "box", (0.1, 0.2, 0.3), (0.3, 0.2, 0.1)),
         capsule("rod", np.array([0.1, 0.2, 0.0]), np.array([0.3, 0.2, 0.4]), 0.03),
+        Shape("can", "cylinder", (0.05, 0.2), (0.3, 0.2, 0.1)),
+        Shape("hull", "mesh", (1.0, 1.0, 1.0), (0.3, 0.2, 0.1), file=str(tetrahedron(tmp_path / "hull.obj"))),
     )
     problem, evaluations = case
     file = tmp_path / "run.rrd"
     write(file, dataclasses.replace(problem, obstacles=Obstacles(solids, 0.02)), evaluations)
-    for name in ("ball", "box", "rod"):
+    for name in ("ball", "box", "rod", "can", "hull"):
         assert {f"/obstacles/{name}", f"/planar/obstacles/{name}"} <= entities(file)
     (outline,) = component(file, "/planar/obstacles/box", "LineStrips2D:strips")
     assert np.ptp(outline, axis=0) == pytest.approx([0.1, 0.2], abs=1e-6)
@@ -331,16 +340,34 @@ def test_the_viewer_shows_everything(
 
 
 def test_it_opens_on_the_motion_to_look_at_and_holds_the_clearance(tmp_path: Path) -> None:
+    """The others are its ghosts; limits within reach are lines, what is beyond is said in the title."""
     report = three_motions()
     recording.write(report, tmp_path)
     file = tmp_path / "recording.rrd"
+    sent, ghost = (component(file, f"/planar/{one}/stick", "LineStrips2D:colors")[0] for one in ("global", "global_2"))
+    assert [sent >> 24, sent >> 16 & 255, sent >> 8 & 255] == list(blueprint.rgba("global")[:3])
+    assert all(255 - (ghost >> shift & 255) < 0.4 * (255 - (sent >> shift & 255)) for shift in (24, 16))
+    _, lines = recording.read_series(file, "/limits/joint_velocity")
+    assert lines.tolist() == [[-0.1, 0.1]] * 2
+    assert recording.read_series(file, "/limits/clearance")[1].tolist() == [[0.02]] * 2
+    drawn = bounds.levels(report.motions.problem, report.motions.evaluations)
+    assert bounds.outside(report.motions.problem, drawn) == {"joint_velocity": "limits from 9 on, outside"}
     for e in report.motions.evaluations:
         time, values = recording.read_series(file, f"/{blueprint.slug(e.label)}/clearance")
         np.testing.assert_array_equal(values[:, 0], e.clearance)
         np.testing.assert_allclose(time, e.time, atol=1e-9)
     plain = {"labels": ["lsv", "global"], "points": np.zeros((1, 3)), "revolute": [True], "planar": False, "ranges": {}}
-    named = blueprint.build(**plain, among=True, first="global").root_container
+    far = {"joint_velocity": "limits from 9 on, outside"}
+    named = blueprint.build(**plain, among=True, first="global", outside=far).root_container
     joints = named.contents[-1]
+    velocities = joints.contents[1].contents[1]
+    assert velocities.name == "Joint velocities [rad/s], limits from 9 on, outside"
+    assert velocities.contents == ["/global/joint_velocity", "/limits/joint_velocity"]
     assert (joints.name, joints.active_tab) == ("Joints", 1)
     checks = named.contents[1].contents[-1]
     assert checks.contents[0].name == "Clearance [m]"
+    many = [f"pareto {number}" for number in range(1, 11)]  # of a front every point is there, most behind their eyes
+    front = blueprint.build(many, np.zeros((1, 3)), [True], True, {}, first="pareto 4")
+    space = front.root_container.contents[0].contents[0].contents[1]
+    assert {f"/{blueprint.slug(one)}/**" for one in many} <= {*space.contents}
+    assert set(space.visualizer_overrides) == {f"/pareto_{number}" for number in (2, 3, 5, 6, 7, 8, 9)}

@@ -26,7 +26,7 @@ def test_distances_equal_those_of_segments(name: str, rng: np.random.Generator) 
     arm = with_shapes(name)
     q = within_limits(arm, 5, rng)
     distances = Clearance(arm, Obstacles((BALL, ROD), 0.02))(q)
-    np.testing.assert_allclose(distances, segment_distances(arm, (BALL, ROD), q), atol=2e-5)
+    np.testing.assert_allclose(distances, segment_distances(arm, (BALL, ROD), q), atol=1e-6)
 
 
 @pytest.mark.parametrize("floats", [False, True], ids=["fixed", "floating"])
@@ -40,9 +40,11 @@ def test_the_solver_measures_the_same(name: str, floats: bool, rng: np.random.Ge
     arm = Arm(description, mounting, Floating(craft, coordinates)) if floats else Arm(description, mounting)
     joints = within_limits(arm.on_fixed_base, 60, rng)
     q = np.hstack([rng.uniform(-0.5, 0.5, size=(60, arm.base.count)), joints])
-    ours, theirs = Clearance(arm, AMONG)(q), solver.Clearance(arm, AMONG).smallest(q)
-    # Distances of capsules and boxes come from an iteration, which stops anywhere within its tolerance.
-    np.testing.assert_allclose(ours, theirs, atol=2e-5)
+    ours, measured = Clearance(arm, AMONG)(q), solver.Clearance(arm, AMONG)
+    theirs = [close.distance for one in q for close in measured.closest(one)]
+    # Drake's distances of capsules and boxes come from an iteration, which stops short of the least one.
+    assert (ours <= np.array(theirs) + 1e-9).all()
+    np.testing.assert_allclose(ours, theirs, atol=1e-4)
     assert ours.min() < 0 < ours.max(), "nothing collides or all does: the test shows nothing"
 
 

@@ -7,11 +7,13 @@ import numpy as np
 import pytest
 
 from pipeline.build.problem import prepare
-from pipeline.common.errors import ConfigError
+from pipeline.common.arrays import Array
+from pipeline.common.errors import ConfigError, RobotError
 from pipeline.evaluation.evaluation import evaluate
 from pipeline.methods.global_planner.planner import global_planner
 from pipeline.model.clearance import Clearance
 from pipeline.model.obstacles import Obstacles
+from pipeline.model.task import PositionTask
 from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Solution, Status, Trajectory
 from pipeline.robot.shapes import Shape, link_shapes
@@ -29,11 +31,18 @@ from tests.support import (
 )
 
 
+def smallest(clearance: Clearance, q: Array) -> Array:
+    """The smallest distance (K,) [m] of any kind."""
+    return np.array([min(close.distance for close in clearance.closest(one)) for one in q])
+
+
 @pytest.mark.parametrize("name", ["planar4r", "panda", "xarm7"])
 def test_distances_equal_those_of_segments(name: str, rng: np.random.Generator) -> None:
     arm = with_shapes(name)
     clearance, q = Clearance(arm, Obstacles((BALL, ROD), 0.02)), within_limits(arm, 5, rng)
-    np.testing.assert_allclose(clearance.smallest(q), segment_distances(arm, (BALL, ROD), q), atol=2e-5)
+    np.testing.assert_allclose(smallest(clearance, q), segment_distances(arm, (BALL, ROD), q), atol=2e-5)
+    margin = clearance.kinds[0].margin
+    np.testing.assert_array_equal(clearance.clear(q), smallest(clearance, q) >= margin)
 
 
 @pytest.mark.parametrize(("solid", "accuracy"), [(BALL, 1e-6), (ROD, 2e-3), (BOX, 2e-3)], ids=["ball", "rod", "box"])
@@ -47,12 +56,12 @@ def test_the_constraint_and_its_derivative(name: str, solid: Shape, accuracy: fl
     if arm.n < 6:
         solid = replace(solid, position=(0.3, 0.3, 0.0))
     obstacles = Obstacles((solid,), 0.03, 0.2)
-    rows = Clearance(arm, obstacles).rows()
+    (rows,) = Clearance(arm, obstacles).rows()
     q = within_limits(arm, 100, rng)
     value, gradient = rows(q)
-    smallest = Clearance(arm, obstacles).smallest(q)
-    assert (value[smallest < obstacles.margin] > rows.UPPER).all()
-    assert (smallest[value <= rows.UPPER] >= obstacles.margin - 1e-9).all()
+    least = smallest(Clearance(arm, obstacles), q)
+    assert (value[least < obstacles.margin] > rows.UPPER).all()
+    assert (least[value <= rows.UPPER] >= obstacles.margin - 1e-9).all()
     h = 1e-5
     expected = np.stack([(rows(q + h * e)[0] - rows(q - h * e)[0]) / (2 * h) for e in np.eye(arm.n)], axis=1)
     off = np.abs(gradient - expected).max(axis=1) / np.abs(expected).max()
@@ -116,14 +125,16 @@ def test_an_obstacle_on_the_path_is_named() -> None:
         "+obstacles.shapes.wall={kind: box, center: [0.563, 0.24, 0.0], size: [0.04, 0.04, 0.1]}",
         "obstacles.margin=0.01",
     )
-    solution = global_planner(prepare(blocked), blocked.method.global_)[0]
+    problem = prepare(blocked)
+    around = replace(problem, task=PositionTask(with_shapes("planar4r"), problem.task.axes))
+    solution = global_planner(around, blocked.method.global_)[0]
     assert not solution.found
     assert "clearance limit of link" in solution.message
     assert "from wall (0.01 m); the least violation found is" in solution.message
 
 
 def test_no_shapes_no_obstacles() -> None:
-    with pytest.raises(ConfigError, match="has no primitive collision shapes"):
+    with pytest.raises(ConfigError, match="has no collision shapes"):
         prepare(composed("+obstacles.shapes.ball={kind: sphere}", "robot=planar3r"))
     with pytest.raises(ConfigError, match=r"robot\.collision\.link9: no such link; did you mean link"):
         prepare(composed("robot=planar4r", "robot.collision={link9: [{kind: sphere}]}"))
@@ -139,12 +150,14 @@ def test_shapes_of_a_description() -> None:
         '<link name="b"><collision><geometry><box size="1 2 3"/></geometry></collision>'
         '<collision><geometry><mesh filename="x.stl"/></geometry></collision></link></robot>'
     )
-    shapes, meshes = link_shapes(root)
+    shapes = link_shapes(root)
     assert [(s.frame, s.kind, s.size) for s in shapes] == [
         ("a", "sphere", (0.1,)),
-        ("a", "capsule", (0.2, 0.5)),
+        ("a", "cylinder", (0.2, 0.5)),
         ("b", "box", (1.0, 2.0, 3.0)),
+        ("b", "mesh", (1.0, 1.0, 1.0)),
     ]
     assert shapes[1].position == (1.0, 2.0, 3.0)
     np.testing.assert_allclose(shapes[1].rotation, (0, 0, 1.5))
-    assert meshes == ["b"]
+    with pytest.raises(RobotError, match=r"link 'b': the mesh .*x\.stl was not found"):
+        _ = shapes[3].points  # what is not looked at does not matter

@@ -6,7 +6,7 @@ import pytest
 from pydrake.solvers import MathematicalProgram
 
 from pipeline.program import ipopt
-from pipeline.program.residuals import residuals
+from pipeline.program.residuals import Conditions
 
 
 def test_a_bound_a_row_and_a_curve_by_hand() -> None:
@@ -19,9 +19,10 @@ def test_a_bound_a_row_and_a_curve_by_hand() -> None:
     program.AddConstraint(x[0] ** 2 <= 4)
     solved = ipopt.solve(program, [0.5, 1.0])
     assert solved.x == pytest.approx([0, 2], abs=1e-6)
-    violation, optimality = residuals(program, solved.result)
+    conditions = Conditions(program)
+    violation, optimality = conditions.residuals(solved.result)
     assert violation < 1e-8
     assert optimality < 1e-6
     stopped = ipopt.solve(program, [1.0, 0.5], max_iterations=0)
-    assert residuals(program, stopped.result)[0] == pytest.approx(0.5, abs=1e-2)
-    assert residuals(program, stopped.result)[1] > 0.1
+    assert conditions.residuals(stopped.result)[0] == pytest.approx(0.5, abs=1e-2)
+    assert conditions.residuals(stopped.result)[1] > 0.1

@@ -134,7 +134,9 @@ def test_a_sweep_whose_runs_turn_out_to_share_a_folder(run: Run, tmp_path: Path)
 def test_how_to_write_what_hydra_reads_in_quotes_only(run: Run, tmp_path: Path) -> None:
     (tmp_path / "arm ö.urdf").write_bytes((ROOT / "robots" / "planar3r.urdf").read_bytes())
     assert_refused(run(*LSV, "robot.urdf=arm ö.urdf"), "'robot.urdf=\"arm ö.urdf\"'")
-    assert run(*LSV, 'robot.urdf="arm ö.urdf"').code == 0
+    assert run(*LSV, 'robot.urdf="arm ö.urdf"', "robot.q_init=[0,0.327,-0.754]").code == 0
+    (record,) = tmp_path.rglob("run.json")
+    assert json.loads(record.read_text(encoding="utf-8"))["robot"] == "arm_ö"  # not planar3r, whose option stands there
 
 
 def test_what_is_told_to_be_written_is_what_a_shell_passes_on(run: Run) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from pipeline.artifacts.motion_files import save
+from pipeline.artifacts.motion_files import save_motion
 from pipeline.build.problem import prepare
 from pipeline.build.rest import suggested
 from pipeline.config.methods import GlobalOptions
@@ -259,7 +259,7 @@ def test_what_is_sent_keeps_its_limits_read_back_by_pinocchio(tmp_path: Path) ->
     sent = study(Motions(config, problem, [evaluate(problem, one) for one in motions]))
     assert isinstance(sent, Resampled)
     arm = problem.task.arm.description
-    save(tmp_path, sent, arm.actuated, arm.base)
+    save_motion(tmp_path, sent, arm.actuated, arm.base)
     table, bounds = pd.read_csv(tmp_path / "motion.csv"), problem.bounds
     q, qd, qdd = (
         table[[f"{joint}_{kind}" for joint in arm.actuated]].to_numpy()

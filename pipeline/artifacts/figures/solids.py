@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from scipy.spatial import ConvexHull
-from scipy.spatial.transform import Rotation
 
 from pipeline.common.arrays import Array
 from pipeline.robot.shapes import Shape
@@ -17,16 +16,20 @@ COLOR = "#C8463C"
 
 def surface(shape: Shape) -> Array:
     """Points (P, 3) [m] on the surface of a solid in the world, of which the hull is the solid."""
-    if shape.kind == "box":
-        corners = np.stack(np.meshgrid(*[(-0.5, 0.5)] * 3), axis=-1).reshape(-1, 3)
-        own = corners * np.array(shape.size)
+    if shape.kind in ("box", "mesh"):
+        own = shape.points
+    elif shape.kind == "cylinder":
+        angle = np.linspace(0.0, 2 * np.pi, 25)
+        rim = shape.size[0] * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=-1)
+        up = np.array([0.0, 0.0, shape.size[1] / 2])
+        own = np.concatenate([rim + up, rim - up])
     else:
         u, v = np.meshgrid(np.linspace(0.0, 2 * np.pi, 25), np.linspace(0.0, np.pi, 14))
         ball = np.stack([np.cos(u) * np.sin(v), np.sin(u) * np.sin(v), np.cos(v)], axis=-1).reshape(-1, 3)
         own = shape.size[0] * ball
         if shape.kind == "capsule":
             own[:, 2] += np.sign(ball[:, 2]) * shape.size[1] / 2
-    return Rotation.from_rotvec(shape.rotation).apply(own) + np.array(shape.position)
+    return shape.placed(own)
 
 
 def outline(shape: Shape, dims: Any = (0, 1)) -> Array:

@@ -53,16 +53,18 @@ def build(
     floats: bool = False,
     among: bool = False,
     first: str = "",
+    outside: Mapping[str, str] | None = None,
 ) -> rrb.Blueprint:
     """The layout for the motions `labels`; the cameras take in `points` (P, 3) [m], all of the scene.
 
     revolute: (n,) which joints turn; it decides on the units in the titles.
     ranges: the lowest and highest value to show of an entity such as `kinetic_energy`; others show all there is.
     among: whether there are obstacles. first: the label of the motion whose joints are shown first.
-    picture: the title of one that is shown in the first tab, if any. With more than MANY motions the first and the last
-    are shown, and the panel on the left is open, where the eye beside each motion shows or hides it.
+    outside: what a plot's title says of limits that it does not draw, by entity.
+    picture: the title of one that is shown in the first tab, if any. With more than MANY motions the first, the last
+    and `first` are shown, and the panel on the left is open, where the eye beside each motion shows or hides it.
     """
-    hidden = labels[1:-1] if len(labels) > MANY else []
+    hidden = [label for label in labels[1:-1] if label != first] if len(labels) > MANY else []
     arms = _space(labels, points, planar, hidden)
     if planar:
         arms = rrb.Tabs(_plane(labels, points, hidden), arms, name="Arms")
@@ -76,7 +78,7 @@ def build(
     checked = (FLOATING if floats else {}) | (AMONG if among else {}) | CHECKS
     checks = rrb.Tabs(*[compared[entity] for entity in checked], name="Checks")
     opens = labels.index(first) if first in labels else 0
-    joints = rrb.Tabs(*[_joints(label, revolute) for label in labels], active_tab=opens, name="Joints")
+    joints = rrb.Tabs(*[_joints(label, revolute, outside or {}) for label in labels], active_tab=opens, name="Joints")
     return rrb.Blueprint(
         rrb.Horizontal(
             rrb.Vertical(arms, summary, row_shares=[5, 3]),
@@ -132,15 +134,15 @@ def _plane(labels: Sequence[str], points: Array, hidden: Sequence[str]) -> Any:
 def _compare(labels: Sequence[str], entity: str, title: str, shown: tuple[float, float] | None) -> Any:
     return rrb.TimeSeriesView(
         origin="/",
-        contents=[f"/{slug(label)}/{entity}" for label in labels],
+        contents=[f"/limits/{entity}", *(f"/{slug(label)}/{entity}" for label in labels)],
         name=title,
         axis_y=None if shown is None else rrb.ScalarAxis(range=shown),
         plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop),
     )
 
 
-def _joints(label: str, revolute: Sequence[bool]) -> Any:
-    """Positions, velocities and torques of one motion below one another."""
+def _joints(label: str, revolute: Sequence[bool], outside: Mapping[str, str]) -> Any:
+    """Positions, velocities and torques of one motion below one another, with their limits."""
     turn, slide = any(revolute), not all(revolute)
     units = {
         "joint_position": ("Joint positions", "rad", "m"),
@@ -149,8 +151,10 @@ def _joints(label: str, revolute: Sequence[bool]) -> Any:
     }
     views = [
         rrb.TimeSeriesView(
-            origin=f"/{slug(label)}/{entity}",
-            name=f"{title} [{', '.join([unit_turn] * turn + [unit_slide] * slide)}]",
+            origin="/",
+            contents=[f"/{slug(label)}/{entity}", f"/limits/{entity}"],
+            name=f"{title} [{', '.join([unit_turn] * turn + [unit_slide] * slide)}]"
+            + (f", {outside[entity]}" if entity in outside else ""),
             plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop),
         )
         for entity, (title, unit_turn, unit_slide) in units.items()

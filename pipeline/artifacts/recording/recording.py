@@ -2,7 +2,8 @@
 
 Entities, for a motion with the slug `lsv`: `/lsv/joint_position`, `joint_velocity`, `joint_torque` (one vector each),
 `/lsv/kinetic_energy`, `energy_integral`, `tracking_error`, `singular_value`, `spectral_radius` (scalars), and the
-pictures `/lsv/stick`, `trace`, `end_effector` and `/lsv/<robot>`. SI units throughout.
+pictures `/lsv/stick`, `trace`, `end_effector` and `/lsv/<robot>`. SI units throughout. The motion to look at is drawn
+in full colour, the others are its ghosts. Limits are lines on `/limits/...`.
 """
 
 from __future__ import annotations
@@ -15,10 +16,11 @@ import numpy as np
 import pyarrow as pa
 import rerun as rr
 from rerun.chunk import RrdReader
+from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
-from pipeline.artifacts.figures.solids import outline
-from pipeline.artifacts.recording import blueprint
+from pipeline.artifacts.figures.solids import outline, surface
+from pipeline.artifacts.recording import blueprint, bounds
 from pipeline.artifacts.recording.arm import columns, draw_arm
 from pipeline.artifacts.recording.blueprint import faded, pixels, rgba, slug
 from pipeline.artifacts.recording.stream import record
@@ -36,6 +38,7 @@ from pipeline.studies import style
 
 POSES = 12  # of the stroboscopic picture
 SOLID = 110  # opacity of the arms, of 255: those behind must shine through
+GHOST = 0.35  # how much of its colour and opacity is left of a motion that is not looked at first
 REFERENCE = (226, 170, 203)  # the colour that paths have in every picture, mixed with white
 OBSTACLE = (200, 70, 60, 255)
 
@@ -86,7 +89,8 @@ def save(
             send_obstacles(recording, problem.obstacles.shapes, _planar(problem))
         for evaluation in evaluations:
             _send_series(recording, problem, evaluation)
-            _send_motion(recording, problem, evaluation)
+            _send_motion(recording, problem, evaluation, GHOST if opens not in ("", evaluation.label) else 1.0)
+        bounds.send(recording, problem, evaluations)
 
     record(file, _layout(problem, evaluations, picture, opens), fill)
 
@@ -127,6 +131,7 @@ def _layout(problem: Problem, evaluations: Sequence[Evaluation], picture: Path |
         floats,
         problem.obstacles is not None,
         opens,
+        bounds.outside(problem, bounds.levels(problem, evaluations)),
     )
 
 
@@ -215,24 +220,27 @@ def _channels(color: str) -> tuple[int, ...]:
     return tuple(int(color[i : i + 2], 16) for i in (1, 3, 5))
 
 
-def _send_motion(recording: Any, problem: Problem, evaluation: Evaluation) -> None:
+def _send_motion(recording: Any, problem: Problem, evaluation: Evaluation, keep: float) -> None:
+    """The pictures of a motion; keep: how much of its colour is left, 1 but for ghosts."""
     rows = _finite(evaluation)
     if not rows.any():
         return
     root, label, time = slug(evaluation.label), evaluation.label, columns(evaluation.time[rows])
-    skeleton = evaluation.skeleton[rows]
-    _send_arm(recording, problem, evaluation, time, evaluation.q[rows])
-    _send_stick(recording, root, label, time, skeleton, (rr.LineStrips3D, rr.Points3D), {})
+    skeleton, color = evaluation.skeleton[rows], faded(evaluation.label, keep)
+    _send_arm(recording, problem, evaluation, time, evaluation.q[rows], round(SOLID * keep))
+    _send_stick(recording, root, color, time, skeleton, (rr.LineStrips3D, rr.Points3D), {})
     if _planar(problem):
         flat, root = _flat(skeleton), f"planar/{root}"
-        _send_stick(recording, root, label, time, flat, (rr.LineStrips2D, rr.Points2D), {"draw_order": 50.0})
+        above = {"draw_order": 30.0 + 20.0 * keep}  # over its ghosts
+        _send_stick(recording, root, color, time, flat, (rr.LineStrips2D, rr.Points2D), above)
         chosen = np.unique(np.rint(np.linspace(0, len(flat) - 1, POSES)).astype(int))
-        poses = rr.LineStrips2D(list(flat[chosen]), colors=faded(label, 0.3), radii=pixels(0.8), draw_order=10.0)
+        pale = faded(label, 0.3 * keep)
+        poses = rr.LineStrips2D(list(flat[chosen]), colors=pale, radii=pixels(0.8), draw_order=10.0)
         recording.log(f"{root}/poses", poses, static=True)
         arm = problem.task.arm
         if arm.base.kind == "floating":
             edges = rr.LineStrips2D.columns(strips=list(_flat(outlines(arm, evaluation.base)[rows])))
-            look = {"colors": rgba(label), "radii": pixels(1.5), "draw_order": 45.0}
+            look = {"colors": color, "radii": pixels(1.5), **above}
             recording.log(f"{root}/spacecraft", rr.LineStrips2D.from_fields(**look), static=True)
             recording.send_columns(f"{root}/spacecraft", time, edges)
 
@@ -240,7 +248,7 @@ def _send_motion(recording: Any, problem: Problem, evaluation: Evaluation) -> No
 def _send_stick(
     recording: Any,
     root: str,
-    label: str,
+    color: tuple[int, ...],
     time: list[Any],
     skeleton: Array,
     kinds: tuple[Any, Any],
@@ -249,7 +257,7 @@ def _send_stick(
     """The stick figure (K, n + 1, 2 or 3), its joints, the end effector with its trace; `kinds`: lines and points."""
     lines, dots = kinds
     tip, count = skeleton[:, -1], skeleton.shape[1]
-    shown = {"colors": rgba(label), **extra}
+    shown = {"colors": color, **extra}
     recording.log(f"{root}/stick", lines.from_fields(radii=pixels(2.0), **shown), static=True)
     recording.send_columns(f"{root}/stick", time, lines.columns(strips=list(skeleton)))
     recording.log(f"{root}/joints", dots.from_fields(radii=pixels(3.5), **shown), static=True)
@@ -265,15 +273,17 @@ def _flat(points: Array) -> Array:
     return points[..., :2] * np.array([1.0, -1.0])
 
 
-def _send_arm(recording: Any, problem: Problem, evaluation: Evaluation, time: list[Any], q: Array) -> None:
+def _send_arm(
+    recording: Any, problem: Problem, evaluation: Evaluation, time: list[Any], q: Array, opacity: int
+) -> None:
     """The user's own picture of the arm in the colour of the method; without one the stick figure must do."""
     moving = evaluation.base.reaction is None
     rows = _finite(evaluation)
     poses = (evaluation.base.position[rows], evaluation.base.rotation[rows]) if moving else None
     arm, root = problem.task.arm, slug(evaluation.label)
-    draw_arm(recording, arm, root, rgba(evaluation.label, SOLID), time, q, poses)
+    draw_arm(recording, arm, root, rgba(evaluation.label, opacity), time, q, poses)
     if moving and arm.base.spacecraft.mass > 0:
-        _send_spacecraft(recording, arm, root, evaluation.label)
+        _send_spacecraft(recording, arm, root, rgba(evaluation.label, opacity))
 
 
 def send_obstacles(recording: Any, shapes: Sequence[Shape], planar: bool) -> None:
@@ -292,6 +302,13 @@ def send_obstacles(recording: Any, shapes: Sequence[Shape], planar: bool) -> Non
             solid: Any = rr.Capsules3D(
                 lengths=[length], radii=[radius], translations=[shape.position - axis], **place, **common
             )
+        elif shape.kind == "cylinder":
+            sizes = {"lengths": [shape.size[1]], "radii": [shape.size[0]]}
+            solid = rr.Cylinders3D(**sizes, centers=[shape.position], **place, **common)
+        elif shape.kind == "mesh":
+            points = surface(shape)
+            faces = ConvexHull(points).simplices
+            solid = rr.Mesh3D(vertex_positions=points, triangle_indices=faces, albedo_factor=OBSTACLE)
         elif shape.kind == "sphere":
             solid = rr.Ellipsoids3D(radii=[shape.size[0]], centers=[shape.position], **common)
         else:
@@ -299,14 +316,14 @@ def send_obstacles(recording: Any, shapes: Sequence[Shape], planar: bool) -> Non
         recording.log(f"obstacles/{slug(shape.name)}", solid, static=True)
 
 
-def _send_spacecraft(recording: Any, arm: Arm, root: str, label: str) -> None:
+def _send_spacecraft(recording: Any, arm: Arm, root: str, color: tuple[int, ...]) -> None:
     """The box that stands for the spacecraft, in the frame of the root link."""
     shape = box(arm)
     solid = rr.Boxes3D(
         sizes=[shape.size],
         centers=[shape.position],
         quaternions=[Rotation.from_rotvec(shape.rotation).as_quat()],
-        colors=[rgba(label, SOLID)],
+        colors=[color],
         fill_mode="solid",
     )
     recording.log(f"{root}/spacecraft", rr.CoordinateFrame(f"{root}/{arm.description.base}"), static=True)

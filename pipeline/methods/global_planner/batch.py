@@ -51,7 +51,7 @@ class Batch:
     @property
     def cheap(self) -> bool:
         """Whether a start costs no more than its part of one batch."""
-        return self.first is self.problem and self.problem.obstacles is None
+        return self.first is self.problem and not self.problem.keeps_clear
 
     @staticmethod
     def without(problem: Problem, options: GlobalOptions) -> str | None:
@@ -100,6 +100,13 @@ class Batch:
         given = self.options.tolerance, self.options.max_iterations
         confirms = Confirm(self.first, on, *given), Confirm(self.problem, on, *given)
         return [optimum and self._finish(on, optimum, *confirms) for optimum in refined]
+
+    def finish_near(self, times: Array, optimum: Optimum) -> Optimum | None:
+        """The optimum of the problem near one that falls short of its margins; None: lost, or not served."""
+        if not self._suffices(times, optimum):
+            return None
+        given = self.options.tolerance, self.options.max_iterations
+        return self._finish(times, optimum, Confirm(self.first, times, *given), Confirm(self.problem, times, *given))
 
     def _begun(self, times: Array, optimum: Optimum) -> Optimum | None:
         if self._suffices(times, optimum):
@@ -153,10 +160,9 @@ class Batch:
         if not optimum.continuous:
             return optimum
         confirm, keep_off = loose if self._suffices(times, optimum) else whole, 0.0
-        if self.first.obstacles is not None:
+        if self.first.keeps_clear:
             optimum, keep_off = clear_between(
-                self.first.task.arm,
-                self.first.obstacles,
+                self.first,
                 times,
                 optimum,
                 lambda q, keep_off: _solve(self.solver.on(times, keep_off), q[None], WARM)[0],
@@ -180,10 +186,17 @@ def _solve(newton: Newton, guesses: Array, barrier: Barrier, dear: float = np.in
     """One batch; each start's share of its time is the same."""
     answer = newton.solve(guesses, barrier, dear=dear)
     optima = []
-    for q, cost, converged, iterations, residual, too_dear in zip(
-        answer.q, answer.cost, answer.converged, answer.iterations, answer.residual, answer.dear, strict=True
+    for q, cost, converged, nearly, iterations, residual, too_dear in zip(
+        answer.q,
+        answer.cost,
+        answer.converged,
+        answer.nearly,
+        answer.iterations,
+        answer.residual,
+        answer.dear,
+        strict=True,
     ):
-        good = bool(converged and residual <= ON_PATH)
+        good = bool((converged and residual <= ON_PATH) or nearly)  # IPOPT ends what is nearly there
         entry = {
             "solver": "newton",
             "intervals": q.shape[0] - 1,

@@ -11,17 +11,16 @@ from scipy.interpolate import CubicSpline
 
 from pipeline.common.arrays import Array
 from pipeline.config.methods import GlobalOptions
-from pipeline.model.arm import Arm
-from pipeline.model.clearance import Clearance
-from pipeline.model.obstacles import Obstacles
+from pipeline.evaluation.certified import FINE, lacking
+from pipeline.evaluation.clearance import Clearance
 from pipeline.problem.costs import objective_values
 from pipeline.problem.integrals import of_order
 from pipeline.problem.lagrangian import Lagrangian
 from pipeline.problem.objective import Objective
 from pipeline.problem.problem import Problem
+from pipeline.problem.solution import Trajectory
 from pipeline.program.feasibility import violations
 from pipeline.program.ipopt import STOPPED
-from pipeline.program.residuals import residuals
 from pipeline.program.transcription import transcribe
 
 # What a coarse grid's optimum needs to be told apart and refined; only the last grid's is reported.
@@ -35,9 +34,6 @@ ROUGH = {"constr_viol_tol": 1e-5, "acceptable_tol": 1e-4, "acceptable_constr_vio
 
 
 ROOM = 1e-3  # relative, to a torque limit that may be left out
-
-
-BETWEEN = 4  # points per interval where clearances between knots are looked at
 
 
 CLEARANCE_ROUNDS = 5
@@ -184,7 +180,7 @@ def optimise(problem: Problem, times: Array, guess: Array, options: GlobalOption
         "cost": cost,
     }
     if last:
-        entry["violation"], entry["optimality"] = residuals(program.drake, outcome.result, program.functions)
+        entry["violation"], entry["optimality"] = program.residuals(outcome)
     return Optimum(q, cost, outcome.converged, outcome.status, solves=[entry])
 
 
@@ -204,32 +200,33 @@ def refine(context: tuple[Problem, list[Array], GlobalOptions], start: Optimum) 
         if failures > 1:
             return replace(finer, converged=False, solves=solves)
     optimum = replace(optimum, solves=solves)
-    if problem.obstacles is not None and optimum.converged:
-        optimum, _ = clear_between(
-            problem.task.arm,
-            problem.obstacles,
-            grids[-1],
-            optimum,
-            lambda q, keep_off: _optimise_lazily(problem, grids[-1], q, options, keep_off),
-        )
+    if problem.keeps_clear and optimum.converged:
+        optimum = cleared(problem, grids[-1], options, optimum)
     return replace(optimum, continuous=stays_on_path(problem, grids[-1], optimum.q))
 
 
+def cleared(problem: Problem, times: Array, options: GlobalOptions, optimum: Optimum) -> Optimum:
+    """As `clear_between`, by IPOPT."""
+    return clear_between(
+        problem, times, optimum, lambda q, keep_off: _optimise_lazily(problem, times, q, options, keep_off)
+    )[0]
+
+
 def clear_between(
-    arm: Arm, obstacles: Obstacles, times: Array, optimum: Optimum, again: Callable[[Array, float], Optimum]
+    problem: Problem, times: Array, optimum: Optimum, again: Callable[[Array, float], Optimum]
 ) -> tuple[Optimum, float]:
     """The optimum that keeps its clearance between the knots too: solved again, a little farther off at the knots.
 
-    again(q, keep_off): the optimum near q that is by keep_off [m] farther off at the knots. Returns the last one too.
+    What it keeps is what the evaluation certifies of the curve that is exported. again(q, keep_off): the optimum near q
+    that is by keep_off [m] farther off at the knots. Returns the last keep_off too.
     """
-    clearance = Clearance(arm, obstacles)
-    fine = np.interp(np.arange(BETWEEN * (len(times) - 1) + 1) / BETWEEN, np.arange(len(times)), times)
+    clearance = Clearance(problem.task.arm, problem.obstacles, problem.own)
     keep_off, solves = 0.0, list(optimum.solves)
     for _ in range(CLEARANCE_ROUNDS):
-        lacking = obstacles.margin - float(clearance.smallest(CubicSpline(times, optimum.q)(fine)).min())
-        if lacking <= 0 or not optimum.converged:
+        short = lacking(problem, clearance, Trajectory(times, optimum.q))
+        if short <= 0 or not optimum.converged:
             break
-        keep_off += 1.2 * lacking + 1e-7
+        keep_off += short + FINE / 5
         optimum = again(optimum.q, keep_off)
         solves += optimum.solves
     return replace(optimum, solves=solves), keep_off

@@ -12,6 +12,7 @@ import numpy as np
 
 from pipeline.common.arrays import Array
 from pipeline.config.methods import GlobalOptions
+from pipeline.methods.global_planner.apart import keeps_own, short, without_own
 from pipeline.methods.global_planner.optimum import confirmed
 from pipeline.methods.global_planner.smooth import ATTEMPTS, ENOUGH, Searches, grids, nothing, promised, room
 from pipeline.methods.method import Context
@@ -122,8 +123,17 @@ def timed(problem: Problem, found: list[Solution], options: GlobalOptions, conte
 
 
 def settle(context: tuple[Problem, GlobalOptions], motion: Array) -> Timed:
-    """The motion that the optimum by differences `motion` (N + 1, n) leads to, and its timing."""
+    """The motion that the optimum by differences `motion` (N + 1, n) leads to, and its timing; of the arm itself it is
+    kept off where it comes too near to it without.
+    """
     problem, options = context
+    free = _settle(without_own(problem), options, motion)
+    if not keeps_own(problem) or not free.converged or short(replace(free.problem, own=problem.own), free.curve) <= 0:
+        return free
+    return _settle(problem, options, motion)
+
+
+def _settle(problem: Problem, options: GlobalOptions, motion: Array) -> Timed:
     searches = Searches(options)
     given = replace(problem, free_law=False, free_duration=False)
     curve = Curve.through(given, problem.times, motion)
@@ -147,7 +157,7 @@ def quickest(problem: Problem, curve: Curve, searches: Searches, *, finish: bool
             return Timed(problem, curve, False, solved.outcome.status, np.inf, searches.solves)
         problem, curve = solved.timed(problem), solved.curve
     if finish:
-        first, further = tighten(problem, solved, **searches.given)
+        first, further = tighten(problem, solved, short, **searches.given)
         for one in further:
             searches.note(one)
         solved = first if first.outcome.converged else solved
@@ -193,7 +203,7 @@ def _cheapest(problem: Problem, curve: Curve, searches: Searches) -> Timed:
         if not solved.outcome.converged:
             return Timed(problem, curve, False, solved.outcome.status, np.inf, searches.solves)
         problem, curve = solved.timed(problem), solved.curve
-    solved, further = tighten(problem, solved, **searches.given)
+    solved, further = tighten(problem, solved, short, **searches.given)
     for one in further:
         searches.note(one)
     if not solved.outcome.converged:

@@ -110,7 +110,7 @@ class Controller:
         status = "follows"
         away = float(np.abs(q - self.q).max())
         if away > self.stray:
-            status = f"begins anew: {away:.2g} rad from the reference"
+            status = f"begins anew: {away:.2g} {self.arm.description.unit()} from the reference"
             self._begin_anew(time, q)
         missed = round((time + self.period - self.time) / self.period) - 1
         if missed > 0:

@@ -159,6 +159,7 @@ class Predictor:
             objective=self.objective,
             limits=None,
             obstacles=None,
+            own=None,
             times=times,
         )
         result = solve_window(window, times, np.vstack([q, guess]), self.options.tolerance)

@@ -2,7 +2,8 @@
 
 Every update interval the motion over the next h knots is optimised from the present position and velocity, within the
 position, velocity, acceleration, torque and power limits and clear of the obstacles; its first knots are executed, so
-that the executed motion keeps the limits at its knots. A few coarse knots carry the window on to the end of the path: a
+that the executed motion keeps the limits at its knots. A window that brings the arm too near to itself is solved again
+with the rows that keep it off: few do. A few coarse knots carry the window on to the end of the path: a
 horizon alone runs into dead ends, where the limits leave no way on.
 Windows are solved on their stages (`stages.py`) from the plan before and its multipliers; IPOPT solves them, on the
 planner's own lifted program, where the stages do not serve the objective, or where no plan is left, and checks a sample
@@ -24,12 +25,14 @@ from scipy.interpolate import make_interp_spline
 
 from pipeline.common.arrays import Array
 from pipeline.config.methods import GlobalOptions, RecedingOptions
+from pipeline.methods.global_planner.apart import keeps_own, without_own
 from pipeline.methods.global_planner.planner import global_planner
 from pipeline.methods.method import ANY, Context, Method
 from pipeline.methods.pmke.prediction import path_weight, rollout, solve_window, window_objective
 from pipeline.methods.pmke.predictor import SAMPLE
 from pipeline.methods.pmke.stages import Answer, Stages, why_not
 from pipeline.methods.singularity import singular_value_ratio
+from pipeline.model.clearance import Clearance
 from pipeline.model.kinematics import project
 from pipeline.problem.limits import LIMIT_KINDS
 from pipeline.problem.objective import Objective
@@ -145,7 +148,8 @@ class _Updates:
 
     def __init__(self, problem: Problem, options: RecedingOptions) -> None:
         self.problem, self.options = problem, options
-        self.stages = None if _stages_why_not(problem, options) else Stages(problem)
+        self.stages = None if _stages_why_not(problem, options) else Stages(without_own(problem))
+        self.own = Clearance(problem.task.arm, None, problem.own) if keeps_own(problem) else None
         # Its program knows no accelerations: it would find another motion.
         self.ipopt = not np.isfinite(problem.bounds.acceleration).any()
         self.before: Answer | None = None  # of the last window, where it was solved
@@ -176,8 +180,13 @@ class _Updates:
         if self.stages is None:
             return None, {}
         guess = np.vstack([window.q_init, plan(window.times[1:])])
-        answer = self.stages.solve(window, guess, self.before, self.options.real_time_iterations)
+        most, free = self.options.real_time_iterations, without_own(window)
+        answer = self.stages.solve(free, guess, self.before, most)
         self.before = answer if answer.converged else None
+        if self.own is None or not answer.converged or self.own.clear(answer.q[1:]).all():
+            window = free
+        else:
+            answer = Stages(window).solve(window, guess, None, most)
         if answer.converged:
             self.solved.append((len(self.log), window, answer))
         entry = {

@@ -74,8 +74,8 @@ class Stages:
     def __init__(self, problem: Problem) -> None:
         self.problem, self.task = problem, problem.task
         self.chain, self.n, self.m = Chain.of(problem.task.arm), problem.task.arm.n, problem.task.m
-        obstacles = problem.obstacles
-        self.clearance = None if obstacles is None else Clearance(problem.task.arm, obstacles).rows()
+        around = problem.obstacles, problem.own
+        self.clearance = Clearance(problem.task.arm, *around).rows() if problem.keeps_clear else None
         self.kernels: dict[int, tuple[Few, FewRows]] = {}
 
     def solve(self, window: Problem, guess: Array, before: Answer | None, most: int | None = None) -> Answer:
@@ -105,7 +105,7 @@ class Stages:
                 if fine or count == most:
                     break
         else:
-            status = f"steps of {size:.1e} rad after {count} programs"
+            status = f"steps of {size:.1e} after {count} programs"
         q = np.vstack([window.q_init, x])
         return Answer(q, stage.cost(x), fine, status, count, window.times[1:], z)
 

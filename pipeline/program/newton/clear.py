@@ -11,20 +11,22 @@ from pipeline.program.newton.stencils import By
 
 
 class Clear:
-    """One row for each knot."""
+    """One row for each knot and margin: that from obstacles, that of the arm from itself."""
 
-    count, reach, penalty = 1, 0, 1e3
+    reach, penalty, kinks = 0, 1e3, True
 
-    def __init__(self, rows: clearance.Rows) -> None:
-        self.rows = rows
+    def __init__(self, rows: list[clearance.Rows]) -> None:
+        self.rows, self.count = rows, len(rows)
 
     def values(self, x: Array, begin: Array) -> tuple[Array, Array]:
         return np.zeros(len(x)), self.differentiate(x, begin)[3]
 
     def differentiate(self, x: Array, begin: Array) -> tuple[Array, Array, Blocks, Array, By]:
-        value, by_q = self.rows(x.reshape(-1, x.shape[-1]))
-        kept = (self.rows.UPPER - value).reshape(*x.shape[:2], 1)
-        return np.zeros(len(x)), np.zeros(()), (), kept, (-by_q.reshape(*x.shape[:2], 1, -1),)
+        flat = x.reshape(-1, x.shape[-1])
+        values, slopes = zip(*(row(flat) for row in self.rows), strict=True)
+        kept = clearance.Rows.UPPER - np.stack(values, axis=-1)
+        by_q = -np.stack(slopes, axis=1).reshape(*x.shape[:2], self.count, -1)
+        return np.zeros(len(x)), np.zeros(()), (), kept.reshape(*x.shape[:2], self.count), (by_q,)
 
     def curvature(self, x: Array, begin: Array, z: Array, scale: Array) -> Blocks:
         """Left out: by differences of the gradient it costs more than the iterations that it saves."""

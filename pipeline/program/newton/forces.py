@@ -28,6 +28,7 @@ STEP = 1e-5  # [rad] of central differences of exact first derivatives
 class Forces:
     """The torques of `problem` on `knots`; rows in order: 1 -+ tau/limit, 1 -+ tau qd/power, of the joints limited."""
 
+    kinks = False
     reach, penalty = 2, 100.0  # a larger penalty makes the Hessian indefinite where limits are exceeded
 
     def __init__(self, chain: Chain, problem: Problem, knots: Knots) -> None:

@@ -17,7 +17,8 @@ Mask = NDArray[np.bool_]
 @dataclass
 class Answer:
     """Per start: motions q (S, N + 1, n), cost (S,), converged, iterations (S,), the largest error of the path (S,),
-    whether it was given up as too dear (S,), and wall_time [s] of all.
+    whether it was given up as too dear (S,), whether one that did not converge was nearly there, and wall_time [s] of
+    all.
     """
 
     q: Array
@@ -26,6 +27,7 @@ class Answer:
     iterations: NDArray[np.int_]
     residual: Array
     dear: Mask
+    nearly: Mask
     wall_time: float = 0.0
 
 

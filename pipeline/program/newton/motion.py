@@ -69,12 +69,14 @@ class Point(PerStart):
 
 class Terms(Protocol):
     """What a problem adds to energy and path: a share of the objective, and inequalities c(x) >= 0, `count` (R) for
-    each knot, which know of `reach` unknowns before its own and cost `penalty` times what they lack.
+    each knot, which know of `reach` unknowns before its own and cost `penalty` times what they lack. kinks: whether
+    their derivatives may bend so that no second derivative describes them.
     """
 
     count: int
     reach: int
     penalty: float
+    kinks: bool
 
     def values(self, x: Array, begin: Array) -> tuple[Array, Array]:
         """The share (S,) and c (S, U, R)."""
@@ -90,7 +92,7 @@ class Nothing:
     """No such terms."""
 
     count = reach = 0
-    penalty = 0.0
+    penalty, kinks = 0.0, False
 
     def values(self, x: Array, begin: Array) -> tuple[Array, Array]:
         return np.zeros(len(x)), np.empty((*x.shape[:2], 0))

@@ -38,6 +38,7 @@ ON_PATH = 1e-5  # [m, rad] from where the last step is taken
 NEARLY, NEARLY_ON_PATH = 0.3, 1e-3  # of the cost, [m, rad]: so near an optimum, what it will cost is clear
 BARRIER_END = 1e-10
 COMPLEMENTARITY = 10.0  # times BARRIER_END: how far products of slack and multiplier may be from it
+ROUGHLY, ALMOST = 1e-3, 1e-4  # of the decrement, of rows that are missed: near enough for IPOPT to end it
 FEASIBLE = 1e-9
 
 BEYOND = 1e-6  # [rad] of excess that remains: infeasible
@@ -86,7 +87,7 @@ class Newton:
         count = len(q)
         unknown = np.full(count, np.inf)
         no, zero = np.zeros(count, bool), np.zeros(count, int)
-        answer = Answer(q, unknown.copy(), no.copy(), zero, unknown.copy(), no.copy())
+        answer = Answer(q, unknown.copy(), no.copy(), zero, unknown.copy(), no.copy(), no.copy())
         if not count:
             return answer
         state = self._begin(q, barrier)
@@ -107,6 +108,7 @@ class Newton:
             if iteration == max_iterations:
                 given_up[:] = True
             if given_up.any():
+                answer.nearly[state.number] = self._nearly(state, step) & given_up
                 self._end(answer, state, None, iteration, given_up, np.zeros_like(given_up))
                 if given_up.all():
                     break
@@ -218,6 +220,18 @@ class Newton:
             lack = np.maximum(np.abs(self._lack(state)), state.excess).max(axis=1)
             done &= (gap < COMPLEMENTARITY * BARRIER_END) & (state.mu <= BARRIER_END) & (lack < FEASIBLE)
         return done
+
+    def _nearly(self, state: State, step: Step) -> Mask:
+        """Whether a start is so near an optimum that what keeps it from there are rows that bend where it is: those of
+        clearances do, as the nearest corners of two hulls change.
+        """
+        if not self.motions.terms.kinks:
+            return np.zeros(len(state.x), bool)
+        near = (step.decrement < ROUGHLY) & (self._missed(state.point.error, state.point.tie) < ON_PATH)
+        if self.limits:
+            lack = np.maximum(np.abs(self._lack(state)), state.excess).max(axis=1)
+            near &= (state.mu <= 2 * BARRIER_END) & (lack < ALMOST)
+        return near
 
     def _will_cost(self, state: State, step: Step) -> Array:
         """What starts (S,) come to at least if they lose twice as much as a quadratic would; nothing where the model is

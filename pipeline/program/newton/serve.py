@@ -23,7 +23,8 @@ def why_not(problem: Problem) -> str | None:
     """What Newton's method does not serve in `problem`, for the log; None: it serves it whole.
 
     Served are the kinetic energy, the velocity norm and the torques of an arm on a base that stands, on positions and
-    poses, with any boundary, within limits of positions, velocities, torques and powers, or clear of obstacles.
+    poses, with any boundary, within limits of positions, velocities, torques and powers, or clear of obstacles
+    and of the arm itself.
     """
     objective = problem.objective
     reasons = {
@@ -34,7 +35,7 @@ def why_not(problem: Problem) -> str | None:
         "rest, or limits of accelerations or jerks": any(problem.rest) or problem.bounds.smooth,
         "a path that need not be kept exactly": not problem.reference.exact,
         "bounds on integrals": bool(problem.bounds_of_integrals),
-        "obstacles and torques at once": problem.obstacles is not None and _torques(problem),
+        "clearances and torques at once": problem.keeps_clear and _torques(problem),
         "so few intervals": len(problem.times) <= FEWEST[_torques(problem)],
     }
     return next((reason for reason, holds in reasons.items() if holds), None)
@@ -65,11 +66,11 @@ class Solver:
 
     def __init__(self, problem: Problem) -> None:
         self.problem, self.chain = problem, Chain.of(problem.task.arm)
-        obstacles = problem.obstacles
-        self.clearance = None if obstacles is None else Clearance(problem.task.arm, obstacles)
+        own = problem.obstacles, problem.own
+        self.clearance = Clearance(problem.task.arm, *own) if problem.keeps_clear else None
 
     def on(self, times: Array, keep_off: float = 0.0) -> Newton:
-        """For motions on the knots `times` (N + 1,), by keep_off [m] more than the margin off all obstacles."""
+        """For motions on the knots `times` (N + 1,), by keep_off [m] more than the margin off everything."""
         problem, knots = self.problem, Knots(self.problem.boundary, times)
         x_ref = problem.reference.position(times)
         terms: Terms = NOTHING

@@ -14,14 +14,23 @@ from pipeline.problem.lagrangian import trapezoid_weights
 from pipeline.problem.problem import Boundary, Problem
 from pipeline.program import ipopt
 from pipeline.program.program import Lifted
-from pipeline.program.residuals import residuals
 from pipeline.program.scaling import POSITION_SCALE, Sums, scale
-from pipeline.program.spline.curve import Curve, by_simpson, integrals, stations
+from pipeline.program.spline.curve import Curve, integrals, stations
 
 SMALL = 3e-4  # of velocities and accelerations among the unknowns, relative to the guess's, with the kinetic energy
 
 
 SMALL_WITH_TORQUE = 3e-3
+
+
+# Of IPOPT where w is there and no torque: nearly all rows are short and linear, so that small pivots fill in least, and
+# the Hessian is nearly the identity, so that a short memory, of which every solve pays twice the length, does as well.
+EASY = {"spral_nemin": 1, "limited_memory_max_history": 4}
+
+
+# Of IPOPT in a tube: where most knots touch its wall, slacks of 1e-11 leave rounding errors of 1e-6 in its optimality
+# for hundreds of iterations; with 1e-9 the objective is as good to seven digits.
+TUBE = {"mu_min": 1e-9, "acceptable_iter": 5}
 
 
 @dataclass(frozen=True)
@@ -80,7 +89,7 @@ class Solved:
 
     def residuals(self) -> tuple[float, float]:
         """Violation and optimality that IPOPT has left, see `residuals.py`."""
-        return residuals(self.program.drake, self.outcome.result)
+        return self.program.residuals(self.outcome)
 
 
 class Spline(Lifted):
@@ -98,11 +107,8 @@ class Spline(Lifted):
         self.v_unit, self.a_unit = small / _size(guess.v), small / _size(guess.a)
         self.v, self.a = self.new("v", self.v_unit * guess.v), self.new("a", self.a_unit * guess.a)
         self.counts = self.lagrangian.is_quadratic and stretch is None
-        middle = place[-self.intervals :]
         if self.counts:
             self.w = self.new("w", self.scaling.to_w(velocity))
-            self.middle = self.new("middle", POSITION_SCALE * middle)
-            self.stations = np.vstack([self.y, self.middle]) if by_simpson(problem, guess.times) else self.middle
         if self.forces:
             self.new("forces", self.scaling.force * costs.tau[:, self.forces.rows])
         self.law = self._law(small) if problem.free_law else None
@@ -132,9 +138,14 @@ class Spline(Lifted):
             units |= dict(zip(map(id, (self.law.s, self.law.sd, self.law.sdd)), self.law.units, strict=True))
         return units.get(id(own), POSITION_SCALE)
 
+    def _solver(self) -> dict[str, Any]:
+        if not self.problem.reference.exact:
+            return TUBE
+        return EASY if self.counts and not self.forces else {}
+
     def solve(self, **options: Any) -> Solved:
         """Solve from the guess."""
-        outcome, iterations = self.run(**options)
+        outcome, iterations = self.run(extra=self._solver(), **options)
         q, v, a = (self.read(outcome, unknowns) for unknowns in (self.y, self.v, self.a))
         curve = Curve(self.times, q / POSITION_SCALE, v / self.v_unit, a / self.a_unit)
         stretch = 1.0 if self.stretch is None else float(self.read(outcome, self.stretch)[0])

@@ -33,34 +33,6 @@ def continuous(program: Spline, position: Any, velocity: Any, acceleration: Any)
     _equal(program, second, program.unit(position))
 
 
-def middle(program: Spline) -> None:
-    """q_m = (q0 + q1)/2 + h/8 (v0 - v1) and qd_m = (v0 + v1)/2 + h/8 (a0 - a1), as S qd = w; at the knots S v = w."""
-    if not program.counts:
-        return
-    h, half = program.dt, 0.5 * np.ones(program.intervals)
-    own = sp.eye_array(program.intervals)
-    parts = [(-own, program.middle), (pairs(half, half, h), program.y), (pairs(h / 8, -h / 8, h), program.v)]
-    _equal(program, parts, POSITION_SCALE)
-    first = len(program.w) - program.intervals
-    inner = [(pairs(half, half, h), program.v), (pairs(h / 8, -h / 8, h), program.a)]
-    _velocities(program, slice(first, None), inner)
-    if first:
-        _velocities(program, slice(0, first), [(sp.eye_array(first), program.v)])
-
-
-def _velocities(program: Spline, which: slice, parts: list[tuple[Any, Any]]) -> None:
-    """to_velocity w = what the parts say, each station's rows divided by their size."""
-    rates = program.scaling.to_velocity[which]
-    size = np.abs(rates).max(axis=(1, 2))
-    columns = [sp.block_diag(list(-rates / size[:, None, None]))]
-    unknowns = [program.w[which].ravel()]
-    for form, own in parts:
-        columns.append(sp.kron(sp.diags_array(1 / size) @ form / program.unit(own), sp.eye_array(program.n)))
-        unknowns.append(own.ravel())
-    rows = sp.csc_matrix(sp.hstack(columns))
-    program.drake.AddLinearEqualityConstraint(rows, np.zeros(rows.shape[0]), np.concatenate(unknowns))
-
-
 def rest(program: Spline) -> None:
     """No velocity, and where it is asked for no acceleration, at ends that rest; a cycle without rest ends as it began.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -9,7 +10,6 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d
 
 from pipeline.common.arrays import Array
-from pipeline.model.clearance import Clearance
 from pipeline.problem.problem import Problem
 from pipeline.program.feasibility import Violation
 from pipeline.program.spline.curve import Curve
@@ -126,7 +126,10 @@ def without_forces(problem: Problem) -> Problem:
     return replace(problem, limits=replace(problem.bounds, torque=free, power=free))
 
 
-def tighten(problem: Problem, first: Solved, **options: object) -> tuple[Solved, list[Solved]]:
+Short = Callable[[Problem, Curve], float]  # how far [m] a spline comes within the margins that it has to keep
+
+
+def tighten(problem: Problem, first: Solved, short: Short, **options: object) -> tuple[Solved, list[Solved]]:
     """The optimum that keeps its limits between the knots as well as at them, and all solves after the first.
 
     Where a limit is exceeded in an interval its bounds at both knots are divided by that excess and a little more; from
@@ -136,7 +139,7 @@ def tighten(problem: Problem, first: Solved, **options: object) -> tuple[Solved,
     solved, further, tightened = first, [], Tightened.none(problem, first.curve.times)
     for count in range(ROUNDS):
         posed, curve = solved.timed(problem).slowed(solved.stretch), solved.curve.stretched(solved.stretch)
-        stricter = _stricter(posed, curve, tightened, 1.0 + count)
+        stricter = _stricter(posed, curve, tightened, 1.0 + count, short(posed, curve))
         if stricter is None or not solved.outcome.converged:
             break
         tightened = stricter
@@ -146,7 +149,7 @@ def tighten(problem: Problem, first: Solved, **options: object) -> tuple[Solved,
     return solved, further
 
 
-def _stricter(problem: Problem, curve: Curve, tightened: Tightened, gain: float) -> Tightened | None:
+def _stricter(problem: Problem, curve: Curve, tightened: Tightened, gain: float, lacking: float) -> Tightened | None:
     """Limits at the knots that leave out what this spline exceeds between them; None if it does not."""
     found = excesses(problem, curve)
     factors = {}
@@ -160,10 +163,6 @@ def _stricter(problem: Problem, curve: Curve, tightened: Tightened, gain: float)
                 inner = maximum_filter1d(inner, 2 * (len(inner) // NEAR) + 1, axis=0)
             own[:-1] = np.minimum(own[:-1], getattr(tightened, kind)[:-1] / (1 + inner))
             own[1:] = np.minimum(own[1:], getattr(tightened, kind)[1:] / (1 + inner))
-    lacking = 0.0
-    if problem.obstacles is not None:
-        clear = Clearance(problem.task.arm, problem.obstacles).smallest(curve(sampled(curve.times)))
-        lacking = max(0.0, problem.obstacles.margin - float(clear.min()))
     exceeded = any(float(found[kind].max()) > KEPT for kind in FORCES + OF_TOOL if kind in found)
     if not exceeded and not lacking:
         return None

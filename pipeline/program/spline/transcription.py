@@ -4,7 +4,7 @@ Unknowns, at all knots and each divided by its size:
 
     q_i, v_i, a_i          of the spline: within an interval of length h the acceleration is linear,
     u_i = s_i tau_i        of those forces that count: tau_i = M(q_i) a_i + n(q_i, v_i),
-    w = S qd, q            at the stations of the energy: midway between the knots (`curve.py` says where else).
+    w = S qd               at the stations of the energy: midway between the knots (`curve.py` says where else).
 
 Path rows at the knots, squared torques by the trapezoidal rule over them. Limits of acceleration and jerk hold between
 the knots too, since the one is linear there and the other constant; those of velocity and position hold for the Bezier
@@ -22,10 +22,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from pipeline.problem.problem import Problem
-from pipeline.program.spline import law, rows, tool, torque
+from pipeline.program.spline import energy, law, rows, tool, torque
 from pipeline.program.spline.curve import Curve
 from pipeline.program.spline.program import Spline, Tightened
-from pipeline.program.terms import clearance, ends, energy
+from pipeline.program.terms import clearance, ends
+from pipeline.program.terms.energy import secondary
 
 Term = Callable[[Spline], None]
 
@@ -43,7 +44,7 @@ COMMON: tuple[Term, ...] = (
     clearance.keep,
 )
 
-CHEAPEST: tuple[Term, ...] = (*COMMON, rows.middle, torque.squares, energy.quadratic, energy.secondary)
+CHEAPEST: tuple[Term, ...] = (*COMMON, energy.velocities, torque.squares, energy.quadratic, secondary)
 
 SHORTEST: tuple[Term, ...] = (rows.shorten, *COMMON)
 

@@ -1,11 +1,11 @@
-"""Every link keeps its distance from every obstacle."""
+"""Every link keeps its distance from every obstacle, and from the links that it may not touch."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from pipeline.common.arrays import Array
-from pipeline.model.clearance import Clearance
+from pipeline.model.clearance import Clearance, Rows
 from pipeline.program.differentiable import DifferentiableConstraint
 from pipeline.program.program import Lifted, blocks
 from pipeline.program.scaling import POSITION_SCALE
@@ -13,10 +13,14 @@ from pipeline.program.scaling import POSITION_SCALE
 
 def keep(program: Lifted) -> None:
     """By Drake's smooth penalty at every knot: at most 1 (`model/clearance.py`)."""
-    if program.problem.obstacles is None:
-        return
-    penalty = Clearance(program.arm, program.problem.obstacles).rows(program.keep_off)
-    soft, n = "clearance" in program.elastic, program.n
+    problem = program.problem
+    if problem.keeps_clear:
+        for rows in Clearance(program.arm, problem.obstacles, problem.own).rows(program.keep_off):
+            _add(program, rows)
+
+
+def _add(program: Lifted, penalty: Rows) -> None:
+    soft, n = penalty.kind in program.elastic, program.n
     for knots in blocks(program.first_free, program.intervals + 1):
         shape, split = (len(knots), n), len(knots) * n
 

@@ -7,24 +7,30 @@ order in the step.
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline.common.arrays import Array
 from pipeline.problem.lagrangian import trapezoid_weights
-from pipeline.program.program import Block, Lifted, Rate, blocks
+from pipeline.program.program import Block, Lifted, Program, Rate, blocks
 from pipeline.program.scaling import POSITION_SCALE
 
 
-def quadratic(program: Lifted) -> None:
-    """The sum of 1/2 qd_i' G(q_i) qd_i dt_i, or of what stands for the dt_i at other stations."""
+def quadratic(program: Program) -> None:
+    """The sum of 1/2 qd_i' G(q_i) qd_i dt_i over the ends of all intervals."""
     if not program.lagrangian.is_quadratic or program.elastic:
         return
-    for block in blocks(0, len(program.weights)):
-        unknowns = np.concatenate([program.stations[block].ravel(), program.w[block].ravel()])
-        weight = program.weights[block] / program.scaling.cost
-        energy = weighted_sum(program, program.lagrangian.quadratic_gradient, block, weight)
-        program.add_cost(energy, unknowns)
+    for block in blocks(0, program.intervals):
+        add_sum(program, program.y[block + 1], block)
+
+
+def add_sum(program: Lifted, places: NDArray[Any], stations: Block) -> None:
+    """The same over some stations, by their positions and w."""
+    weight = program.weights[stations] / program.scaling.cost
+    energy = weighted_sum(program, program.lagrangian.quadratic_gradient, stations, weight)
+    program.add_cost(energy, np.concatenate([places.ravel(), program.w[stations].ravel()]))
 
 
 def weighted_sum(program: Lifted, rate: Rate, block: Block, weight: Array) -> Callable[[Array], tuple[float, Array]]:

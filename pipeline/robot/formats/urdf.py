@@ -23,7 +23,7 @@ def read(root: ET.Element, file: Path, end_effector: str) -> Tree:
     for joint in root.findall("joint"):
         tree.add_joint(_joint(joint, f"robot.urdf = {file}: joint '{joint.get('name')}' has"))
     if tree.links:
-        tree.shapes, tree.meshes = link_shapes(root, f"robot.urdf = {file}")
+        tree.shapes = link_shapes(root, f"robot.urdf = {file}", file.parent)
     tree.pictures = list(dict.fromkeys(m.get("filename", "") for m in root.iterfind("link/visual/geometry/mesh")))
     return tree
 

@@ -7,13 +7,13 @@ import pytest
 
 from pipeline.build.problem import prepare
 from pipeline.common.arrays import Array
+from pipeline.evaluation.clearance import Clearance
 from pipeline.evaluation.limits import limit_excess
 from pipeline.methods.pmke.prediction import rollout, solve_window
 from pipeline.methods.pmke.stages import Stages, why_not
-from pipeline.model.clearance import Clearance
 from pipeline.problem.objective import Objective
 from pipeline.problem.problem import Problem
-from tests.support import composed, differences
+from tests.support import composed, differences, with_shapes
 
 TIMES = np.array([0.0, 0.2, 0.4, 0.6, 1.0, 1.5])
 
@@ -35,9 +35,9 @@ def excess(problem: Problem, q: Array) -> dict[str, float]:
     qd = np.diff(q, axis=0) / np.diff(problem.times)[:, None]
     qdd = np.diff(np.vstack([problem.qd_init, qd]), axis=0) / np.diff(problem.times)[:, None]
     tau = problem.task.arm.inverse_dynamics(q[1:], qd, qdd)
-    assert problem.obstacles is not None
-    clearance = float(Clearance(problem.task.arm, problem.obstacles).smallest(q[1:]).min())
-    return limit_excess(problem, q[1:], qd, tau, clearance, qdd=qdd)
+    clearance = Clearance(problem.task.arm, problem.obstacles, problem.own)
+    around, own = (float(clearance.smallest(pairs, q[1:]).min()) for pairs in (clearance.obstacles, clearance.own))
+    return limit_excess(problem, q[1:], qd, tau, around, own=own, qdd=qdd)
 
 
 def test_a_window_ends_where_ipopt_does(problem: Problem, guess: Array) -> None:
@@ -91,7 +91,12 @@ def test_derivatives_equal_central_differences(problem: Problem, guess: Array, r
     from pipeline.methods.pmke.stages import _Window
     from pipeline.program.newton import stencils
 
-    bound = replace(problem, limits=replace(problem.bounds, acceleration=np.full(7, 3.0), power=np.full(7, 20.0)))
+    bound = replace(
+        problem,
+        limits=replace(problem.bounds, acceleration=np.full(7, 3.0), power=np.full(7, 20.0)),
+        task=replace(problem.task, arm=with_shapes("panda")),  # whose distance from the ball bends nowhere
+        own=None,
+    )
     window = _Window(Stages(bound), bound)
     x = guess[1:] + 0.02 * rng.normal(size=guess[1:].shape)
     flat = x.ravel()
