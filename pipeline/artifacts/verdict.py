@@ -35,6 +35,8 @@ def verdict(report: Report) -> str:
     motion, exported, refused = first(report), report.find(Resampled), report.find(Nothing)
     if motion is None or motion.status is not Status.SOLVED:
         return f"Nothing to send: {'; '.join(f'{called(e)} is {status(e)}' for e in report.motions.evaluations)}."
+    if motion.solution.stretch is not None:
+        return _pieces(report)
     reasons = f"{_reasons(report, motion)}."
     if exported is not None and exported.faults:
         return f"Not to be sent, though exported: {called(motion)} {exported.fault}. {_capital(reasons)}"
@@ -44,6 +46,17 @@ def verdict(report: Report) -> str:
         fault = next(one.fault for one in refused.refused if one.is_of(motion))
         return f"Nothing to send: {called(motion)}, the best found, {fault}. {refused.instead}{_capital(reasons)}"
     return f"Best found: {called(motion)}: {reasons}"
+
+
+def _pieces(report: Report) -> str:
+    """Of a path that was cut: how many pieces there are, and which of them were not found."""
+    pieces = [e for e in report.motions.evaluations if e.solution.stretch is not None]
+    bad = [f"{called(e)} is {status(e)}" for e in pieces if status(e) != Status.SOLVED.word]
+    most = max(e.tracking_error_between for e in pieces)
+    found = f"Best found: {len(pieces)} pieces, run one after the other with the transits between them (program.csv)"
+    if len(pieces) == 1:
+        found = "Best found: the whole path in one piece (program.csv)"
+    return f"{'; '.join([found, f'path error {most:.1g} m', *bad])}."
 
 
 def called(e: Evaluation) -> str:

@@ -21,7 +21,7 @@ from pipeline.model.task import PositionTask, Task, pose_task
 from pipeline.path.curves import Geometry, Line, Still, circle, direction_vector
 from pipeline.path.orientation import Orientation
 from pipeline.path.reference import Reference
-from pipeline.path.through import SAME, TURN, Through, steps, through
+from pipeline.path.through import SAME, TURN, Through, one_after_the_other, steps, through
 from pipeline.path.timing import ConstantSpeed, Cruise, Quintic, RaisedCosine, Stamped, Timing, WithStops
 from pipeline.path.waypoints import Waypoints, read, same_point
 from pipeline.robot.packages import find
@@ -69,8 +69,10 @@ def make_task(robot: RobotConfig, arm: Arm) -> Task:
     return pose_task(arm, robot.orientation, robot.pointing)
 
 
-def make_reference(path: Any, timing: TimingConfig, task: Task, q_init: Array) -> tuple[Reference, Array]:
-    """The end effector's motion, and q_init moved onto its start if the path says where it starts."""
+def make_reference(path: Any, timing: TimingConfig, task: Task, q_init: Array) -> tuple[Reference, Array, bool]:
+    """The end effector's motion, q_init moved onto its start if the path says where it starts, and whether the path
+    takes nothing from it: neither its start nor an orientation.
+    """
     if timing.law == "from_file" and timing.duration == "shortest":
         raise ConfigError("timing.duration = shortest: the times are those of path.file (timing.law = from_file)")
     if timing.dense and timing.duration == "shortest":
@@ -82,6 +84,8 @@ def make_reference(path: Any, timing: TimingConfig, task: Task, q_init: Array) -
         raise ConfigError(
             "path.orientation, path.turn: the task prescribes no orientation; set robot.orientation to full or pointing"
         )
+    breaks: tuple[float, ...] = ()
+    in_world = False
     if isinstance(path, WaypointsConfig) and is_gcode(path):
         found, moves, said = moves_of(path, task.axes, here[:count])
         geometry, orientation = found.geometry, None
@@ -98,23 +102,36 @@ def make_reference(path: Any, timing: TimingConfig, task: Task, q_init: Array) -
         points = given_points + here[:count] - given_points[0] if path.relative else given_points
         _refuse_millimetres(path, given_points, task.arm)
         blend = path.blend if path.corners == "blend" else None
-        found = through(points, rows.rotations, rest=path.corners == "stop", blend=blend)
+        ends = [*rows.begins[1:], len(points)]
+        paths = [
+            through(
+                points[a:b],
+                None if rows.rotations is None else rows.rotations[a:b],
+                rest=path.corners == "stop",
+                blend=blend,
+            )
+            for a, b in zip(rows.begins, ends, strict=True)
+        ]
+        found = one_after_the_other(paths, rows.begins)
         geometry, orientation = found.geometry, found.orientation
-        law, notes = _law(path, timing, found, rows.times), _notes(path, found)
+        in_world = not path.relative
+        law, notes, breaks = _law(path, timing, found, rows.times), _notes(path, found), found.breaks
     else:
         if timing.law == "from_file":
             raise ConfigError(
                 f"timing.law = from_file: the times are those of a file; path.kind = {path.kind} has none"
             )
         geometry, orientation, notes = _curve(path, task, here[:count]), None, ()
+        in_world = path.start is not None
         law = timing_law(timing)(timing.seconds)
     if orientation is None and not isinstance(task, PositionTask):
         orientation = _turning(path, geometry, here[count:])
+        in_world &= path.orientation is not None
     start = np.hstack([one.sample(np.zeros(1))[0] for one in (geometry, orientation) if one is not None])
     if np.abs(task.error(q_init[None], start)).max() > 1e-12:
         q_init = place(task, q_init, start[0])
     tolerances = path.tolerance, path.orientation_tolerance
-    return Reference(geometry, law, orientation, *tolerances, notes, path.exact), q_init
+    return Reference(geometry, law, orientation, *tolerances, notes, path.exact, breaks), q_init, in_world
 
 
 def _refuse_millimetres(path: WaypointsConfig, points: Array, arm: Arm) -> None:
@@ -179,6 +196,8 @@ def _read(path: WaypointsConfig, timing: TimingConfig, task: Task) -> Waypoints:
             f"{where} has a column time, and timing.law = {timing.law} does not take it; set timing=from_file, or take "
             "the column out"
         )
+    if stamped and len(rows.begins) > 1:
+        raise ConfigError(f"{where} has a column segment, and timing.law = from_file is for one tool path alone")
     moves, turns = steps(rows.points, rows.rotations)
     still = np.flatnonzero(np.maximum(moves, turns) <= SAME)
     if still.size and (not stamped or len(still) == len(moves)):
@@ -227,6 +246,8 @@ def _notes(path: WaypointsConfig, found: Through) -> tuple[str, ...]:
     if found.stops:
         why = "" if path.corners == "stop" else ", where it turns back or on the spot"
         notes.append(f"the path comes to rest at {_listed(found.stops)}{why}")
+    if found.breaks:
+        notes.append(f"the path is {len(found.breaks) + 1} tool paths, one after the other")
     return tuple(notes)
 
 

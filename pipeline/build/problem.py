@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.build import base
+from pipeline.build.anywhere import from_anywhere
 from pipeline.build.checks import check_problem, require_reach
 from pipeline.build.collision import make_own, require_free_path
 from pipeline.build.goal import make_limits, make_objective, make_obstacles
@@ -26,7 +27,7 @@ def prepare(config: RunConfig) -> Problem:
         require_held_within(arm.description)
     task = make_task(robot, arm)
     given = initial(robot, arm)
-    reference, q_init = make_reference(config.path, config.timing, task, given)
+    reference, q_init, in_world = make_reference(config.path, config.timing, task, given)
     if config.timing.law == "from_file":
         refuse_endless(config, reference.duration, "path.file, which takes ")
     free_law, free_duration = config.timing.law == "optimal", config.timing.duration == "shortest"
@@ -46,6 +47,8 @@ def prepare(config: RunConfig) -> Problem:
         free_law=free_law,
         free_duration=free_duration,
     )
+    if robot.q_init is None and in_world:
+        problem = from_anywhere(problem)
     problem = unless_unlimited(config, problem)
     check_problem(problem, moved=not np.array_equal(given, q_init))
     if config.base.kind == "fixed":

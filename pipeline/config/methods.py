@@ -21,11 +21,13 @@ MethodName = Literal[
     "calculus_of_variations",
     "pontryagin",
     "pontryagin_as_printed",
+    "segments",
 ]
 METHODS: tuple[str, ...] = get_args(MethodName)
 
 # A count is bounded where memory or days of work would end a run instead of a line.
 MOST_KNOTS = 100_000  # of a prediction or grid: each has a mass matrix and its derivatives
+FEWEST_PLACES = 20  # along a path that may have to be cut
 MOST_STARTS = 100_000  # each is a solve
 MOST_MOTIONS = 1_000_000  # each is followed along the coarsest grid
 
@@ -264,6 +266,21 @@ class PontryaginAsPrintedOptions:
 
 
 @schema
+class SegmentsOptions:
+    """Where a path must be cut, the optimum of each piece, and the transits between them."""
+
+    intervals: Annotated[
+        Annotated[Whole, Field(ge=FEWEST_PLACES, le=MOST_KNOTS)],
+        Field(description="of the path, at whose ends it may be cut"),
+    ] = 200
+    nodes: Annotated[
+        Whole,
+        Field(ge=8, le=10_000, description="on the longest self-motion manifold (r = 1); of the samples of each place"),
+    ] = 300
+    planner: Annotated[GlobalOptions, Field(description="set method.global instead")] = GlobalOptions()
+
+
+@schema
 class ParetoOptions:
     """The front of two integrals; `planner` finds its extremes and its first motions."""
 
@@ -294,6 +311,7 @@ class MethodConfig:
     pmke: PmkeOptions = PmkeOptions()
     receding: RecedingOptions = RecedingOptions()
     global_: Annotated[GlobalOptions, Field(alias="global")] = GlobalOptions()
+    segments: SegmentsOptions = SegmentsOptions()
     pareto: ParetoOptions = ParetoOptions()
     dynamic_programming: DynamicProgrammingOptions = DynamicProgrammingOptions()
     lower_bound: LowerBoundOptions = LowerBoundOptions()

@@ -109,7 +109,13 @@ class RobotConfig:
     srdf: Annotated[
         Text | None, Field(description="SRDF that comes with the file: which links may touch; null: none")
     ] = None
-    q_init: Annotated[Positions | None, Field(description="[rad] initial configuration, base to tip")] = (
+    q_init: Annotated[
+        Positions | None,
+        Field(
+            description="[rad] initial configuration, base to tip; null: of a path that says where in the world it is, "
+            "the best one, sought in the whole joint space; of others the middle of the joints' ranges"
+        ),
+    ] = (
         0.0,
         0.327,
         -0.754,

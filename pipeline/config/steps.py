@@ -60,8 +60,8 @@ def refuse_endless_search(config: Any) -> None:
 def _pairs(config: Any, method: str) -> Iterator[tuple[float, float, str, str, str]]:
     """Of a search its size and the bound of it, the keys with their values, how the size is made of them, of what."""
     options, steps = config.method.of(method), config.timing.steps
-    planner = options.planner if method == "pareto" else options
-    if method in ("global", "pareto"):
+    planner = getattr(options, "planner", options)
+    if method in ("global", "pareto", "segments"):
         yield steps, MOST_INTERVALS, f"timing.steps = {steps}", "their number", "intervals of planned motions"
         starts, coarse = planner.optimised, planner.coarse_steps or USUAL
         keys = f"method.global.optimised = {starts}, method.global.coarse_steps = {planner.coarse_steps or 'null'}"

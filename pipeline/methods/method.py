@@ -25,7 +25,7 @@ class Serves:
     limits or obstacles. orientation: whether the task may prescribe one. moving_base: whether the arm may stand on a
     base that floats, or that is held so that what it feels can count. rest: whether the joints may be
     told to rest at an end, or their accelerations and jerks be limited. timing: whether the timing may be left to it.
-    tube: whether the path may be one that need not be kept exactly.
+    tube: whether the path may be one that need not be kept exactly. breaks: whether it may be several tool paths.
     """
 
     redundancy: int | None = None
@@ -37,6 +37,7 @@ class Serves:
     rest: bool = True
     timing: bool = False
     tube: bool = False
+    breaks: bool = False
 
     def why_not(self, problem: Problem) -> str | None:
         """The first condition that `problem` does not meet and what is supported, without full stop; None if served."""
@@ -45,6 +46,8 @@ class Serves:
             return "timing.law = optimal and timing.duration = shortest are found by the method global alone"
         if why is None and not self.tube and not problem.reference.exact:
             return "path.exact = false is used by the method global, and by the front of path_tolerance, alone"
+        if why is None and not self.breaks and problem.reference.breaks:
+            return "the path is several tool paths (column segment of path.file), which the method segments connects"
         return _contradiction(problem) if why is None else f"{why}; supported {self}"
 
     def _unmet(self, problem: Problem) -> str | None:

@@ -12,6 +12,7 @@ from pipeline.methods.pmke.predictive import pmke
 from pipeline.methods.pmke.receding import receding
 from pipeline.methods.pontryagin.as_printed import pontryagin_as_printed
 from pipeline.methods.pontryagin.boundary_value import pontryagin
+from pipeline.methods.segments.segments import segments
 
 METHODS = {
     method.name: method
@@ -27,5 +28,6 @@ METHODS = {
         calculus_of_variations,
         pontryagin,
         pontryagin_as_printed,
+        segments,
     )
 }

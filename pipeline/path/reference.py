@@ -8,6 +8,7 @@ import numpy as np
 
 from pipeline.common.arrays import Array
 from pipeline.path.curves import Geometry
+from pipeline.path.part import Part
 from pipeline.path.spline import Sampled
 from pipeline.path.timing import Timing
 
@@ -19,6 +20,7 @@ class Reference:
     tolerance [m], orientation_tolerance [rad]: how far from it a motion may be between its knots; where it is not
     `exact`, at any time: the path is then the centre of a tube.
     notes: what a user should know of the path, in sentences without a full stop.
+    breaks: arc lengths [m] where one tool path ends and another begins elsewhere; no continuous motion passes them.
     """
 
     geometry: Geometry
@@ -28,6 +30,7 @@ class Reference:
     orientation_tolerance: float = 1e-3
     notes: tuple[str, ...] = ()
     exact: bool = True
+    breaks: tuple[float, ...] = ()
 
     @property
     def tolerances(self) -> tuple[float, float]:
@@ -64,6 +67,13 @@ class Reference:
         """The same path with so much of its tolerances."""
         tolerance, orientation_tolerance = share * self.tolerance, share * self.orientation_tolerance
         return replace(self, tolerance=tolerance, orientation_tolerance=orientation_tolerance)
+
+    def part(self, start: float, end: float) -> Reference:
+        """The path between two arc lengths [m] under its share of the law; raises InputError where there is none."""
+        length = self.geometry.length
+        oriented = None if self.orientation is None else Part(self.orientation, start, end)
+        law = self.timing.part(start / length, end / length)
+        return replace(self, geometry=Part(self.geometry, start, end), timing=law, orientation=oriented, breaks=())
 
     def slowed(self, by: float) -> Reference:
         """The same path in `by` times the time."""

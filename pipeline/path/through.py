@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -27,6 +28,7 @@ class Through:
     stops: indices of way-points between the first and the last at which the path comes to rest.
     departure: the largest distance [m] of the curve from the way-points' polygon, and the way-point before it, from 1.
     closer: indices of the corners whose legs are too short for the blend asked for.
+    breaks: arc lengths [m] where it goes on elsewhere.
     """
 
     geometry: Geometry
@@ -35,6 +37,29 @@ class Through:
     stops: tuple[int, ...]
     departure: tuple[float, int]
     closer: tuple[int, ...] = ()
+    breaks: tuple[float, ...] = ()
+
+
+def one_after_the_other(paths: Sequence[Through], begins: Sequence[int]) -> Through:
+    """Several paths that do not touch as one, which rests and breaks off where one ends; begins: the indices of their
+    first way-points.
+    """
+    if len(paths) == 1:
+        return paths[0]
+    ends = np.concatenate([[0.0], np.cumsum([path.geometry.length for path in paths])])
+    oriented = [path.orientation for path in paths if path.orientation is not None]
+    stops = [i + begin for path, begin in zip(paths, begins, strict=True) for i in path.stops]
+    closer = tuple(i + begin for path, begin in zip(paths, begins, strict=True) for i in path.closer)
+    worst = max(range(len(paths)), key=lambda k: paths[k].departure[0])
+    return Through(
+        Chain([path.geometry for path in paths], ends),
+        Chain(oriented, ends) if oriented else None,
+        np.concatenate([path.marks + end for path, end in zip(paths, ends[:-1], strict=True)]),
+        tuple(sorted([*stops, *begins[1:]])),
+        (paths[worst].departure[0], paths[worst].departure[1] + begins[worst]),
+        closer,
+        tuple(map(float, ends[1:-1])),
+    )
 
 
 def through(points: Array, rotations: Rotation | None, *, rest: bool = False, blend: float | None = None) -> Through:

@@ -13,6 +13,10 @@ import numpy as np
 from scipy.interpolate import BPoly, CubicSpline
 
 from pipeline.common.arrays import Array
+from pipeline.common.errors import InputError
+
+SAME_STOP = 1e-9  # of the length
+
 
 Scaled = TypeVar("Scaled", bound="Timing")
 
@@ -34,6 +38,11 @@ class Timing(Protocol):
     def slowed(self, by: float) -> Timing:
         """The same law in `by` times the time."""
 
+    def part(self, start: float, end: float) -> Timing:
+        """The law of the part of the path between two fractions of its length, which takes that share of the time and
+        begins and ends as the whole does; raises InputError where there is none.
+        """
+
 
 class Scalable:
     """A law that its duration says all of."""
@@ -41,6 +50,21 @@ class Scalable:
     def slowed(self: Scaled, by: float) -> Scaled:
         """The same law in `by` times the time."""
         return replace(self, duration=self.duration * by)  # type: ignore[type-var]
+
+    def part(self: Scaled, start: float, end: float) -> Timing:
+        """The same law in its share of the time."""
+        return self.slowed(end - start)
+
+
+class Indivisible:
+    """A law whose parts do not begin and end at rest."""
+
+    def part(self, start: float, end: float) -> Timing:
+        """There is none."""
+        raise InputError(
+            "a part of the path cannot be run through by itself under the times or feeds of a file; choose "
+            "timing=raised_cosine, quintic or cruise"
+        )
 
 
 @dataclass(frozen=True)
@@ -138,9 +162,17 @@ class WithStops(Scalable):
             out[0, rows] += stops[i] * length
         return out[0], out[1], out[2]
 
+    def part(self, start: float, end: float) -> Timing:
+        """The same from rest to rest between the stops that are left."""
+        within = [stop for stop in self.stops if start + SAME_STOP < stop < end - SAME_STOP]
+        if not within:
+            return self.law((end - start) * self.duration)
+        stops = (0.0, *((stop - start) / (end - start) for stop in within), 1.0)
+        return replace(self, duration=(end - start) * self.duration, stops=stops)
+
 
 @dataclass(frozen=True)
-class Feeds:
+class Feeds(Indivisible):
     """From stop to stop each move at a feed of its own, every change of it a raised cosine of the time T_a:
 
     sdd = sum dv_j k(t - t_j),    k(t) = (1 - cos(2 pi t / T_a)) / T_a    on [0, T_a],
@@ -188,7 +220,7 @@ class Feeds:
 
 
 @dataclass(frozen=True)
-class Tabled(ABC):
+class Tabled(Indivisible, ABC):
     """A law through fractions (P,) of the length at times (P,) [s], from 0 on; how it goes between is `_law`."""
 
     times: tuple[float, ...]

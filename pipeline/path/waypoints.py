@@ -17,17 +17,22 @@ from pipeline.common.arrays import Array
 from pipeline.common.errors import PathError
 
 ROLL_PITCH_YAW, QUATERNION, TIME = ("roll", "pitch", "yaw"), ("qx", "qy", "qz", "qw"), "time"
+SEGMENT = "segment"
 LARGEST = 1e9  # [m], [rad] and [s]
 MOST = 100_000  # rows: each becomes a piece of a spline
 
 
 @dataclass(frozen=True)
 class Waypoints:
-    """points (P, m) [m], P >= 2; rotations (P) and times (P,) [s], increasing, or None where the file has none."""
+    """points (P, m) [m], P >= 2; rotations (P) and times (P,) [s], increasing, or None where the file has none.
+
+    begins: the rows at which a tool path begins, 0 alone where the file is one.
+    """
 
     points: Array
     rotations: Rotation | None = None
     times: Array | None = None
+    begins: tuple[int, ...] = (0,)
 
 
 def read_waypoints(file: str | File, axes: Sequence[str]) -> Array:
@@ -46,14 +51,32 @@ def same_point(row: int) -> str:
 
 def read(file: str | File, axes: Sequence[str]) -> Waypoints:
     """The rows of a CSV file with a column [m] for each of `axes`; it may have roll, pitch, yaw [rad] or qx, qy, qz,
-    qw, and time [s]. Raises PathError, one line, for anything else that it holds.
+    qw, time [s], and segment, whose value is the same along each of several tool paths. Raises PathError, one line,
+    for anything else that it holds.
     """
     table = _table(File(file))
     _check_header(file, [str(name) for name in table.columns], axes)
     points = _numbers(file, table, axes)
     if len(points) < 2:
         raise PathError(f"path.file = {file}: {len(points)} way-point{'s' * (len(points) != 1)}, at least 2 are needed")
-    return Waypoints(points, _rotations(file, table), _times(file, table) if TIME in table else None)
+    times = _times(file, table) if TIME in table else None
+    return Waypoints(points, _rotations(file, table), times, _begins(file, table))
+
+
+def _begins(file: str | File, table: pd.DataFrame) -> tuple[int, ...]:
+    """Where another value stands in the column segment than in the row before."""
+    if SEGMENT not in table:
+        return (0,)
+    labels = table[SEGMENT].fillna("").str.strip().to_numpy()
+    begins = np.flatnonzero(np.concatenate([[True], labels[1:] != labels[:-1]]))
+    named = labels[begins]
+    if len(set(named)) < len(named):
+        again = next(name for i, name in enumerate(named) if name in named[:i])
+        raise PathError(f"path.file = {file}: segment {again} comes twice; the rows of a segment stand together")
+    short = np.flatnonzero(np.diff([*begins, len(labels)]) < 2)
+    if short.size:
+        raise PathError(f"path.file = {file}: segment {named[short[0]]} has 1 way-point, at least 2 are needed")
+    return tuple(map(int, begins))
 
 
 def _table(file: File) -> pd.DataFrame:
@@ -107,7 +130,7 @@ def _check_header(file: str | File, header: Sequence[str], axes: Sequence[str]) 
                 f"path.file = {file}: an orientation needs the columns {', '.join(kind)}; the header has {only}, and "
                 f"no {', '.join(lacking)}"
             )
-    known = (*axes, *ROLL_PITCH_YAW, *QUATERNION, TIME)
+    known = (*axes, *ROLL_PITCH_YAW, *QUATERNION, TIME, SEGMENT)
     unknown = [name for name in header if name not in known]
     if unknown:
         close = difflib.get_close_matches(unknown[0].lower(), known, n=1, cutoff=0.75)
@@ -115,8 +138,8 @@ def _check_header(file: str | File, header: Sequence[str], axes: Sequence[str]) 
         named = ", ".join(name or "(no name)" for name in unknown)
         raise PathError(
             f"path.file = {file}: column{'s' * (len(unknown) > 1)} {named} not understood; {hint}needed are "
-            f"{', '.join(axes)}; beside them there may be {', '.join(ROLL_PITCH_YAW)} or {', '.join(QUATERNION)}, and "
-            f"{TIME}"
+            f"{', '.join(axes)}; beside them there may be {', '.join(ROLL_PITCH_YAW)} or {', '.join(QUATERNION)}, "
+            f"{TIME} and {SEGMENT}"
         )
 
 

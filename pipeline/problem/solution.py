@@ -55,6 +55,8 @@ class Solution:
     `clear_between`: of those, clearances are promised along the whole curve.
     `knots_only`: it goes from node to node of a grid, and promises nothing of the path between its knots.
     `grid` is the key of the configuration that its knots come from.
+    `stretch` [m]: the part of the path that it follows, if not all; `approach`: the motion through joint space from
+    the part before, from rest to rest, its times from 0 on.
     `evidence`: what speaks for the motion, in words: how it was found and what confirms it.
     `reference`: the path with the law that was found for it; None: it is the problem's.
     `found` is False where there is no motion to speak of: the trajectory then only holds the arm at its start.
@@ -75,6 +77,8 @@ class Solution:
     grid: str = "timing.steps"
     evidence: str = ""
     reference: Reference | None = None
+    stretch: tuple[float, float] | None = None
+    approach: Trajectory | None = None
     statistics: dict[str, Any] = field(default_factory=dict)
 
     def posed(self, problem: Problem) -> Problem:

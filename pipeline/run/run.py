@@ -39,7 +39,8 @@ def run(config: RunConfig, folder: Path) -> int:
         solutions, seconds = solve(problem, config, Context(config.seed, workers, progress, phase))
     console.phase(config.name, "evaluating")
     with stages("evaluate"):
-        problem = solutions[0].posed(problem)  # where its timing was to be found, with that of the best
+        if solutions[0].stretch is None:  # where its timing was to be found, with that of the best
+            problem = solutions[0].posed(problem)
         motions = Motions(config, problem, [evaluate(problem, solution) for solution in solutions], workers)
     with stages("studies"):
         results = tuple(result for study in STUDIES if (result := study(motions)) is not None)

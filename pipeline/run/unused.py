@@ -40,7 +40,10 @@ def _why(group: str, key: str, config: RunConfig) -> str:
     """Why the key does nothing; empty if it does."""
     first, _, rest = key.partition(".")
     if group == "method" and rest:
-        runs = {*config.methods, *({"global"} if "pareto" in config.methods or config.candidate_study.run else ())}
+        runs = {
+            *config.methods,
+            *({"global"} if {"pareto", "segments"} & set(config.methods) or config.candidate_study.run else ()),
+        }
         return "" if first in runs else f"{first} does not run (methods = [{','.join(config.methods)}])"
     if group in ("closed_loop", "control", "candidate_study", "identification") and first != "run":
         return "" if getattr(config, group).run else f"{group}.run = false"

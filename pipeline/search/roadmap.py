@@ -45,7 +45,7 @@ class Roadmap:
         self.manifold = OnMovingBase(problem) if problem.task.arm.base.count else Manifold(problem)
         self.closed = problem.boundary is Boundary.CYCLIC
         self.times = _layers(problem, grid, layers, nodes) if self.closed else _spread(grid, layers)
-        self.nodes = _Sampler(self.manifold, self.times, nodes, rng).layers()
+        self.nodes = Sampler(self.manifold, self.times, nodes, rng).layers()
         self._more = 1  # times as many nodes of each layer as `random` would need without velocity limits
         self.edges: Edges = []
         if min(map(len, self.nodes)):
@@ -169,7 +169,7 @@ def edge_costs(manifold: Manifold, times: Array, nodes: list[Array], velocity: A
     return edges
 
 
-class _Sampler:
+class Sampler:
     """The layers' nodes."""
 
     def __init__(self, manifold: Manifold, times: Array, count: int, rng: np.random.Generator) -> None:

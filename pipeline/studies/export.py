@@ -115,6 +115,8 @@ class Nothing(Result):
 def study(motions: Motions) -> Result | None:
     """The motion that is to be exported, resampled; None if none is asked for, or the method asked for has none."""
     asked = motions.config.export.method
+    if any(e.solution.stretch is not None for e in motions.evaluations) and motions.methods == {"segments"}:
+        return None  # pieces are sent with their transits (`pieces.py`)
     sent, refused = _sent(motions)
     if sent is not None:
         return sent[1]
@@ -154,7 +156,10 @@ def _sent(motions: Motions) -> tuple[tuple[Evaluation, Resampled] | None, tuple[
     """
     config = motions.config.export
     refused: list[Resampled] = []
-    good = sorted((e for e in motions.solved if config.method in ("best", e.method)), key=lambda e: e.objective)
+    good = sorted(
+        (e for e in motions.solved if e.solution.stretch is None and config.method in ("best", e.method)),
+        key=lambda e: e.objective,
+    )
     for motion in good:
         found = resample(motion.solution.posed(motions.problem), motion, config.rate)
         if not found.faults:

@@ -12,6 +12,7 @@ from pipeline.studies import (
     export,
     front,
     identification,
+    pieces,
     retiming,
     validation,
 )
@@ -26,6 +27,7 @@ STUDIES: tuple[Study, ...] = (
     retiming.study,
     deadlines.study,
     control.study,
+    pieces.study,
     export.study,
     closed_loop.study,
     candidates.study,

@@ -58,7 +58,7 @@ def dashes(label: str) -> str | tuple[int, tuple[float, ...]]:
 def name(label: str) -> str:
     """The name of a motion for legends and titles: `Planner's optimum 2`."""
     method, optimum = _split(label)
-    numbered = optimum > 1 or method == "pareto"
+    numbered = optimum > 1 or method in ("pareto", "segments")
     title = METHODS[method].title if method in METHODS else method
     return title + (f" {optimum}" if numbered else "")
 

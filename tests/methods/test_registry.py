@@ -41,6 +41,7 @@ SMALL = (
         "method.receding.update_interval=2",
     ),
     *("method.dynamic_programming.nodes=60", "method.dynamic_programming.intervals=6"),
+    *("method.segments.intervals=20", "method.segments.nodes=60"),
     *("method.lower_bound.intervals=6", "method.lower_bound.cells=30"),
     *("method.calculus_of_variations.spacing=0.3", "method.calculus_of_variations.refinements=1"),
     *(
@@ -74,11 +75,11 @@ SERVED = {
     "fixed": set(METHODS),
     "free": set(METHODS),
     "cyclic": BASELINES | {"dynamic_programming", "lower_bound"},
-    "limits": BASELINES | {"dynamic_programming", "lower_bound"},
-    "torque": BASELINES,
+    "limits": BASELINES | {"dynamic_programming", "lower_bound", "segments"},
+    "torque": BASELINES | {"segments"},
     "floating": BASELINES,
     "held": BASELINES,
-    "r = 2": BASELINES | {"pontryagin", "pontryagin_as_printed"},
+    "r = 2": BASELINES | {"pontryagin", "pontryagin_as_printed", "segments"},
 }
 WHY = {  # a word of the refusal, where the problem's name is none
     "floating": "the base is floating",

@@ -25,8 +25,10 @@ def test_the_error_of_a_circle_at_constant_speed_is_that_of_cubic_interpolation(
 
 def test_parts_of_the_intervals_keep_the_tolerance_and_fewer_do_not() -> None:
     problem = prepare(composed(*TURNS, "timing.steps=100"))
-    parts = resolving(problem, 2000)
-    assert parts is not None
+    knots = resolving(problem, 2000)
+    assert knots is not None
+    parts, left = divmod(len(knots) - 1, 100)
+    assert left == 0
     errors = []
     for count in (parts, parts - 1):
         knots, fine = divided(problem.times, count), np.linspace(0.0, 1.0, 20_001)
@@ -57,7 +59,25 @@ def test_a_line_at_constant_speed_shows_nothing_and_the_error_falls_by_its_order
 
 def test_a_coarse_grid_shows_the_shape_of_its_path() -> None:
     assert roughly(prepare(composed()), 25) == 25
-    assert 100 < roughly(prepare(composed(*TURNS)), 25) < 400
+    turns = prepare(composed(*TURNS, "timing.steps=500"))
+    assert 100 < roughly(turns, 25) < 400
+    assert roughly(prepare(composed(*TURNS, "timing.steps=30")), 25) == 30  # no more than there are
+
+
+def test_knots_lie_where_the_path_curves() -> None:
+    words = ("path=waypoints", "path.file=robots/square.csv", "path.corners=blend", "path.blend=0.0005", "robot=panda")
+    problem = prepare(composed(*words, "path.units=mm", "path.relative=true", "timing.steps=10", "path.tolerance=1e-5"))
+    knots = resolving(problem, 2000)
+    assert knots is not None
+    assert np.isin(problem.times, knots).all()
+    steps = np.diff(knots)
+    assert np.maximum(steps[1:] / steps[:-1], steps[:-1] / steps[1:]).max() < 2 + 1e-9
+    fine = np.linspace(0.0, problem.reference.duration, 20_001)
+    spline = CubicSpline(knots, problem.reference.position(knots), bc_type="clamped")
+    off = np.linalg.norm(spline(fine) - problem.reference.position(fine), axis=1)
+    assert off.max() <= problem.reference.tolerance
+    even = np.linspace(0.0, problem.reference.duration, 2 * len(knots))
+    assert path_error(problem, even)[0] > problem.reference.tolerance  # twice as many would not do
 
 
 def test_an_orientation_that_turns_by_more_than_half_a_turn_is_one_smooth_curve() -> None:

@@ -18,12 +18,12 @@ from pipeline.config.methods import GlobalOptions
 from pipeline.methods.global_planner.apart import apart, keeps_own, without_own
 from pipeline.methods.global_planner.basins import Basins, basins, ceiling
 from pipeline.methods.global_planner.batch import JUMPS, Batch
-from pipeline.methods.global_planner.grids import coarsest, finer, on_knots, refinement
+from pipeline.methods.global_planner.grids import coarsest, finer, on_knots, refinement, served
 from pipeline.methods.global_planner.optimum import Optimum, go_on, optimise_start, refine
 from pipeline.methods.global_planner.ranking import in_order
 from pipeline.methods.global_planner.reasons import counted, no_feasible, no_optimum, no_start
 from pipeline.methods.global_planner.smooth import freer, nothing, rough, smooth, splined, unserved
-from pipeline.methods.global_planner.starts import Starts
+from pipeline.methods.global_planner.starts import Known, Starts
 from pipeline.methods.global_planner.timed import timed
 from pipeline.methods.global_planner.tube import exactly, loosened
 from pipeline.methods.method import ALONG_LOOPS, WITH_TIMING, Context, Method
@@ -52,19 +52,23 @@ STEPS_ALONE = 12  # where each start costs a solve of its own
 DEAREST = 3.5  # times the best: dearer optima are not refined, nor does it count that they are new
 
 
+MOST_SOLVED = 30_000  # intervals of all starts on the coarsest grid: on a longer one there are fewer
+
+
 HOPELESS = 0.1  # relative violation on a coarse grid from which on finer ones are not tried
 
 
-def solve(problem: Problem, options: GlobalOptions, context: Context) -> list[Solution]:
-    """The distinct optima found from these starts, best first."""
+def solve(problem: Problem, options: GlobalOptions, context: Context, known: Known | None = None) -> list[Solution]:
+    """The distinct optima found from these starts, best first; `known`: from these motions alone."""
     if not splined(problem, options):
         if problem.reference.exact:
-            return by_differences(problem, options, context)
+            return by_differences(problem, options, context, known)
         return loosened(problem, by_differences(exactly(problem), options, context), options, context)
     first = (freer if problem.free_timing else rough)(problem)
-    found = by_differences(first, options, context)
+    found = by_differences(first, options, context, known)
     if not found[0].found and first.constrained and not problem.free_timing:
-        found = max(found, by_differences(freer(problem), options, context), key=lambda motions: motions[0].found)
+        again = by_differences(freer(problem), options, context, known)
+        found = max(found, again, key=lambda motions: motions[0].found)
     if found[0].found:  # on the knots that the path needs
         problem = replace(problem, times=found[0].trajectory.time)
     if problem.free_timing:
@@ -72,7 +76,9 @@ def solve(problem: Problem, options: GlobalOptions, context: Context) -> list[So
     return smooth(problem, found, options, context)
 
 
-def by_differences(problem: Problem, options: GlobalOptions, context: Context, lazy: bool = True) -> list[Solution]:
+def by_differences(
+    problem: Problem, options: GlobalOptions, context: Context, known: Known | None = None, lazy: bool = True
+) -> list[Solution]:
     """The same on the knots alone, as the papers have it.
 
     lazy: of the arm itself only the starts keep clear; of the optima those that come too near to it are solved again,
@@ -84,9 +90,10 @@ def by_differences(problem: Problem, options: GlobalOptions, context: Context, l
     if too_coarse:
         return [nothing(problem, Status.NOT_CONVERGED, too_coarse, {})]
     asked, problem = len(problem.times) - 1, replace(problem, times=times)
-    grids = refinement(times, coarsest(problem, options.coarse_steps, STEPS if why is None else STEPS_ALONE))
+    shape = coarsest(problem, options.coarse_steps, STEPS if why is None else STEPS_ALONE)
+    grids = refinement(times, shape, shape if options.coarse_steps is None else 2)
     context.phase("drawing starts")
-    drawn = Starts(problem, grids[0], options, np.random.default_rng(context.seed))
+    drawn = Starts(problem, grids[0], options, np.random.default_rng(context.seed), known)
     motions, log = drawn.first, drawn.log
     if lazy:
         problem = without_own(problem)
@@ -121,9 +128,14 @@ def by_differences(problem: Problem, options: GlobalOptions, context: Context, l
     ]
     log["barren_starts"] = coarse.barren
     context.phase("refining and confirming")
-    problem, grids, refined = _to_the_end(problem, grids, options, coarse.optima, batch, context)
+    before, refined = (problem, grids), list[Optimum]()
+    while len(refined) < len(coarse.optima) and not any(map(_good, refined)):
+        lot = coarse.optima[len(refined) : len(refined) + served(before[0])]
+        problem, grids, fine_ones = _to_the_end(*before, options, lot, batch, context)
+        refined += fine_ones
     log["grids"] = [len(grid) - 1 for grid in grids]
-    found = [(fine, members) for fine, members in zip(refined, coarse.members, strict=True) if _good(fine)]
+    log["optima_left_coarse"] = left = len(coarse.optima) - len(refined)
+    found = [(fine, members) for fine, members in zip(refined, coarse.members, strict=False) if _good(fine)]
     if options.refine_to is not None:  # the grid is that of the best: others may need a finer one, or jump on any
         best = min((fine.cost for fine, _ in found), default=np.inf)
         sent = [pair for pair in found if pair[0].cost == best or finer(problem, MOST, [pair[0].q]) is None]
@@ -132,7 +144,7 @@ def by_differences(problem: Problem, options: GlobalOptions, context: Context, l
     if lazy and found:
         found = [(fine, members) for fine, (_, members) in zip(clear, found, strict=True) if _good(fine)]
         if not found:
-            return by_differences(given, options, context, lazy=False)
+            return by_differences(given, options, context, known, lazy=False)
         problem = replace(given, times=problem.times)
     log["jumping_optima"] = coarse.jumping + sum(fine.converged and not fine.continuous for fine in refined)
     if not found:
@@ -140,7 +152,7 @@ def by_differences(problem: Problem, options: GlobalOptions, context: Context, l
         return [nothing(problem, Status.NOT_CONVERGED, why_not, log)]
     members = {id(fine): count for fine, count in found}
     ranked = in_order(problem, basins(problem, problem.times, [fine for fine, _ in found], options.same_path).optima)
-    words = counted(len(ranked), len(starts), coarse.barren)
+    words = counted(len(ranked), len(starts), coarse.barren, left)
     solutions = []
     for rank, (fine, moved) in enumerate(ranked):
         said = _said(problem, asked, options, [fine.q]) if rank == 0 else ""
@@ -174,21 +186,28 @@ def as_solution(problem: Problem, optimum: Optimum, options: GlobalOptions) -> S
 
 
 def finish(
-    problem: Problem, times: Array, motions: Array, options: GlobalOptions, context: Context
+    problem: Problem, times: Array, motions: Array, options: GlobalOptions, context: Context, lazy: bool = True
 ) -> tuple[Array, list[Optimum]]:
     """The distinct optima, best first, to which motions (S, N + 1, n) on the knots `times` lead, and the knots that
-    they are on: the problem's, or those that its path needs. Motions that are lost on the way are left out.
+    they are on: the problem's, or those that its path needs. Motions that are lost on the way are left out. lazy: see
+    `by_differences`.
     """
     knots, too_coarse = on_knots(problem, options.refine_to)
     if too_coarse:
         return knots, []
-    problem = replace(problem, times=knots)
+    given, lazy = problem, lazy and keeps_own(problem)
+    problem = replace(without_own(problem) if lazy else problem, times=knots)
     batch = Batch(problem, options) if Batch.without(problem, options) is None else None
     grids = [times, *(grid for grid in refinement(knots, len(times)) if len(grid) > len(times))]
     starts = _optimise_starts(problem, times, options, motions, batch, context)
     chosen = basins(problem, times, starts, options.same_path).optima
     problem, _, refined = _to_the_end(problem, grids, options, chosen, batch, context)
     good = [optimum for optimum in refined if _good(optimum)]
+    if lazy and good:
+        problem = replace(given, times=problem.times)
+        good = [optimum for optimum in apart(problem, good, options, context) if _good(optimum)]
+        if not good:
+            return finish(given, times, motions, options, context, lazy=False)
     return problem.times, basins(problem, problem.times, good, options.same_path).optima
 
 
@@ -234,8 +253,9 @@ def _draw_on(
     context: Context,
 ) -> tuple[list[Optimum], Basins]:
     """Twice as many starts and again, until the last half of them brought nothing new or the budget is spent."""
+    budget = min(options.budget, max(len(starts), MOST_SOLVED // (len(grid) - 1)))
     while True:
-        motions = drawn.further(max(0, min(len(starts), options.budget - len(starts))), grid)
+        motions = drawn.further(max(0, min(len(starts), budget - len(starts))), grid)
         if len(motions):
             dear = ceiling(min(start.cost for start in starts if start.converged), DEAREST)
             fresh, done = batch.coarse(grid, motions, dear), _teller(context, len(motions), starts)
@@ -243,7 +263,7 @@ def _draw_on(
                 done(count, start)
             starts = starts + fresh
         found = basins(problem, grid, starts, options.same_path, jumps=JUMPS, dearest=DEAREST)
-        if not len(motions) or len(starts) >= options.budget or 2 * found.barren >= len(starts):
+        if not len(motions) or len(starts) >= budget or 2 * found.barren >= len(starts):
             return starts, found
 
 

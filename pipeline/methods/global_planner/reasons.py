@@ -19,10 +19,11 @@ OTHERS = "more starts (method.global.optimised) or other ones (method.global.sta
 REACHED = 1e-6  # [m, rad]
 
 
-def counted(optima: int, starts: int, barren: int) -> str:
-    """How many optima came of how many starts."""
+def counted(optima: int, starts: int, barren: int, left: int = 0) -> str:
+    """How many optima came of how many starts; `left` dearer ones were not carried to the long path's knots."""
     count = f"{optima} distinct optim{'um' if optima == 1 else 'a'} found from {starts} starts"
-    return f"{count}; the last {barren} starts brought nothing new; "
+    dearer = f"{left} dearer one{'s' if left > 1 else ''} of the coarse grid not refined; " if left else ""
+    return f"{count}; the last {barren} starts brought nothing new; {dearer}"
 
 
 def no_start(problem: Problem, drawn: int) -> str:
@@ -54,7 +55,7 @@ def no_feasible(starts: int, relaxed: Relaxed) -> str:
 def no_optimum(problem: Problem, grid: Array, starts: list[Optimum], refined: list[Optimum], jumping: int = 0) -> str:
     """There are starts, on `grid`, but no optimum: why, in the solver's own words. `jumping` were not refined."""
     if any(start.converged for start in starts):
-        fates = {optimum.status if not optimum.converged else "jumps between branches" for optimum in refined}
+        fates = {_fate(optimum) if not optimum.converged else "jumps between branches" for optimum in refined}
         fates |= {"jumps between branches"} if jumping else set()
         lost = len(refined) + jumping
         return (
@@ -66,6 +67,19 @@ def no_optimum(problem: Problem, grid: Array, starts: list[Optimum], refined: li
         f"none of {len(starts)} starts converged (most often: {words}){_nearest(problem, grid, starts)}; "
         f"try more iterations (method.global.max_iterations), {OTHERS}"
     )
+
+
+def unmet(status: str, violation: float, optimality: float) -> str:
+    """How a solve ended that did not converge, with what it could not meet and by how much."""
+    return f"{status}: its constraints hold to {violation:.0e}, its optimality to {optimality:.0e}"
+
+
+def _fate(optimum: Optimum) -> str:
+    told = optimum.solves[-1] if optimum.solves else {}
+    if "optimality" not in told:
+        return optimum.status
+    words = f"{optimum.status} on {told['intervals']} intervals"
+    return unmet(words, told["violation"], told["optimality"])
 
 
 def _nearest(problem: Problem, grid: Array, starts: list[Optimum]) -> str:

@@ -14,8 +14,9 @@ from scipy.interpolate import CubicSpline
 from pipeline.common.arrays import Array
 from pipeline.config.methods import GlobalOptions
 from pipeline.methods.global_planner.apart import keeps_own, short, without_own
+from pipeline.methods.global_planner.grids import finer, off_path, served
 from pipeline.methods.global_planner.optimum import confirmed
-from pipeline.methods.global_planner.reasons import counted
+from pipeline.methods.global_planner.reasons import counted, unmet
 from pipeline.methods.method import Context
 from pipeline.problem.limits import FREE, LIMIT_KINDS
 from pipeline.problem.problem import Boundary, Problem
@@ -149,10 +150,13 @@ def resolved(problem: Problem, motion: Array) -> Array:
 
 def smooth(problem: Problem, found: list[Solution], options: GlobalOptions, context: Context) -> list[Solution]:
     """The distinct optima among the splines, best first; or one solution that says what stands against any."""
-    motions = [solution.trajectory.q for solution in found if solution.found]
+    every_motion = [solution.trajectory.q for solution in found if solution.found]
+    motions = every_motion[: served(problem)]
     if not motions:
         return found
-    knots, given = resolved(problem, motions[0]), problem.times
+    given = found[0].trajectory.time
+    knots = resolved(problem, CubicSpline(given, motions[0])(problem.times))
+    grown = len(knots) - len(problem.times)
     problem, motions = replace(problem, times=knots), list(CubicSpline(given, motions, axis=1)(knots))
     splines = context.workers.map(refine, (problem, options), motions)
     log = found[0].statistics
@@ -169,8 +173,15 @@ def smooth(problem: Problem, found: list[Solution], options: GlobalOptions, cont
     every = np.array([spline.curve.q for spline in good])
     revolute = problem.task.arm.description.revolute
     ranked = distinct(every, costs, len(good), options.same_path, revolute)
-    words = counted(len(ranked), len(log.get("starts", splines)), log.get("barren_starts", 0))
-    more = f"{len(knots) - len(given)} more knots show the start from rest" * (len(knots) > len(given))
+    first = good[ranked[0]].curve
+    more_knots = finer(problem, options.refine_to, [first.q], first.ends) if problem.reference.exact else None
+    if more_knots is not None:
+        return smooth(replace(problem, times=more_knots), found, options, context)
+    if options.refine_to is not None:  # the knots are those of the best: others may need more
+        ranked = [i for i in ranked if i == ranked[0] or follows(problem, good[i].curve)]
+    left = len(every_motion) - len(motions) + log.get("optima_left_coarse", 0)
+    words = counted(len(ranked), len(log.get("starts", splines)), log.get("barren_starts", 0), left)
+    more = f"{grown} more knots show the start from rest" * (grown > 0)
     solutions = []
     for rank, index in enumerate(ranked):
         own = good[index]
@@ -188,6 +199,12 @@ def smooth(problem: Problem, found: list[Solution], options: GlobalOptions, cont
             )
         )
     return solutions
+
+
+def follows(problem: Problem, curve: Curve) -> bool:
+    """Whether a spline keeps its path between its knots too; that of a tube is another's to judge."""
+    off = off_path(problem, curve.q, curve.ends).max(axis=1)
+    return not problem.reference.exact or bool(np.all(off <= problem.reference.tolerances))
 
 
 def promised(problem: Problem) -> float:
@@ -232,10 +249,17 @@ def _refine(problem: Problem, options: GlobalOptions, motion: Array) -> Smooth:
     if solved.outcome.converged:
         solver.confirm(solved)
     kept = all(float(excess.max()) <= ENOUGH for excess in excesses(problem, solved.curve).values())
-    status = solved.outcome.status if kept or not solved.outcome.converged else "exceeds a limit between its knots"
+    status = _status(solved, kept)
     good = kept and solved.outcome.converged
     curve = solved.curve if good or solver.last is None else solver.last
     return Smooth(curve, good, status, objective(problem, curve), solver.solves)
+
+
+def _status(solved: Solved, kept: bool) -> str:
+    """IPOPT's word for how a solve ended; where it has not converged, with what it could not meet and by how much."""
+    if solved.outcome.converged:
+        return solved.outcome.status if kept else "exceeds a limit between its knots"
+    return unmet(f"{solved.outcome.status} on {len(solved.curve.times) - 1} intervals", *solved.residuals())
 
 
 def shortest(context: tuple[Problem, GlobalOptions], start: Curve) -> Smooth:

@@ -23,19 +23,27 @@ from pipeline.search.roadmap import Roadmap
 from pipeline.search.selection import diverse
 
 Further = Callable[[int], Array]  # about so many more motions
+Known = Callable[[Array], Array]  # motions (K, N + 1, n) on any knots (N + 1,)
 
 
 @dataclass
 class Starts:
-    """`first` (K, N + 1, n) on the knots `grid`, best first by generator; `log`: how they came about."""
+    """`first` (K, N + 1, n) on the knots `grid`, best first by generator, or those that are
+    `known`; `log`: how they came about.
+    """
 
     problem: Problem
     grid: Array
     options: GlobalOptions
     rng: np.random.Generator
+    known: Known | None = None
     log: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        if self.known is not None:
+            self.first = self.known(self.grid)
+            self._further: list[Further] = [self.none]
+            return
         lots = [GENERATORS[name](self) for name in self.options.generators]
         self.first = np.concatenate([first for first, _ in lots])
         self._further = [further for _, further in lots]
