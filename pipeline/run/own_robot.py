@@ -46,7 +46,7 @@ def words(asked: Sequence[str]) -> tuple[list[str], str]:
     said = {
         "end_effector": f"end_effector={tip} (its last link)",
         "task": f"task={task}" + (" (it moves in a plane)" if flat else ""),
-        "q_init": "q_init=null (the middle of the joints' ranges)",
+        "q_init": "q_init=null (sought for a path in the world, else the middle of the joints' ranges)",
     }
     taken = [line for key, line in said.items() if key in own]
     line = f"note: {file.name} says no more, so robot.{', robot.'.join(taken)}" if taken else ""
