@@ -27,6 +27,7 @@ REFUSED = {
     "hidden option": (["robot=_common"], ["robot = _common", "no such option", "allowed: panda, planar3r"]),
     "hidden experiment": (["-m", "+experiment=sim1,_sim"], ["experiment = _sim", "no such option"]),
     "closest option": (["robot=pandda"], ["robot = pandda", "did you mean panda?"]),
+    "sweeper": (["-m", "hydra/sweeper=bayes"], ["hydra/sweeper = bayes", "allowed: basic", "pip install '.[optuna]'"]),
     "plus forgotten": (["experiment=traj3"], ["experiment=traj3", "did you mean +experiment=traj3?"]),
     "group": (["paths=line"], ["paths", "did you mean path"]),
     "numbers for an option": (["boundary=[1,2]"], ["boundary=[1,2]: "]),
