@@ -16,8 +16,9 @@ help: ## this list
 run: $(VENV)/.installed ## set up, then run the third trajectory of the PMKE paper
 	$(BIN)/python -m pipeline +experiment=traj3
 
-reproduce: $(VENV)/.installed ## every printed number and figure of the documents, side by side (outputs/reproduction/)
+reproduce: $(VENV)/.installed-dev ## every printed number and figure of the documents, side by side (outputs/reproduction/), every erratum
 	$(BIN)/python -m pipeline.reproduce
+	$(BIN)/python -m tests.reproduce.errata
 
 audit: $(VENV)/.installed-dev ## recompute the shipped experiments' tables by pinocchio and coal (docs/audit.md)
 	$(BIN)/python -m tests.audit

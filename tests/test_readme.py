@@ -12,14 +12,25 @@ from hydra import compose, initialize_config_dir
 from pipeline.common.files import shipped
 from pipeline.config.compose import checked
 from pipeline.describe.facts import inspect
+from pipeline.run import own_robot
 from pipeline.run.main import CONF
 from pipeline.run.state import state
 
 ROOT = Path(__file__).resolve().parent.parent
 GUIDES = [str(file.relative_to(ROOT)) for file in sorted((ROOT / "docs" / "guide").glob("*.md"))]
 NAMES = ["README.md", "docs/errata.md", "docs/tour.md", *GUIDES]
-TEXTS = {name: re.sub(r"\\\n\s*", "", (ROOT / name).read_text(encoding="utf-8")) for name in NAMES}
-QUESTIONS = (" --help", " -sc ")
+QUESTIONS = (" --help", " -sc ", " --config-dir")  # the last has a test of its own in run/test_main.py
+
+
+def _read(name: str) -> str:
+    """The text as a shell would take its commands: lines that go on joined, variables replaced."""
+    text = re.sub(r"\\\n\s*", "", (ROOT / name).read_text(encoding="utf-8"))
+    for variable, value in re.findall(r"^([A-Z]\w*)=(\S+)$", text, re.MULTILINE):
+        text = text.replace(f"${variable}", value)
+    return text
+
+
+TEXTS = {name: _read(name) for name in NAMES}
 COMMANDS = sorted(
     {
         line.split("  ")[0]
@@ -34,6 +45,8 @@ INSPECTED = sorted(set(re.findall(r"python -m pipeline\.describe([^`\n]*)", "\n"
 def _values(word: str) -> list[str]:
     """One override per value of a swept key."""
     key, _, value = word.partition("=")
+    if interval := re.fullmatch(r"interval\((.*)\)", value):  # a sweeper picks from it: both ends are values
+        value = interval.group(1)
     return [f"{key}={one}" for one in value.split(",")] if not value.startswith(("[", "{")) else [word]
 
 
@@ -43,14 +56,16 @@ def test_commands_state_a_problem(command: str) -> None:
     words = [word for word in shlex.split(command) if word not in ("-m", "--cfg", "job")]
     for number in range(max(len(_values(word)) for word in words) if words else 1):
         overrides = [_values(word)[min(number, len(_values(word)) - 1)] for word in words]
+        own, _ = own_robot.words(overrides)
         with initialize_config_dir(CONF, version_base="1.3"):
-            state(checked(compose("config", overrides=overrides)))
+            state(checked(compose("config", overrides=[*own, *overrides])))
 
 
 @pytest.mark.parametrize("command", INSPECTED)
 def test_arms_are_inspected(command: str) -> None:
+    words = shlex.split(command)
     with initialize_config_dir(CONF, version_base="1.3"):
-        asked = checked(compose("config", overrides=shlex.split(command)))
+        asked = checked(compose("config", overrides=[*own_robot.words(words)[0], *words]))
     assert inspect(asked.robot, asked.gravity).reach > 0
 
 

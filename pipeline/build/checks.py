@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from pipeline.build.collision import too_near
 from pipeline.common.errors import ConfigError, PathError
 from pipeline.model.clearance import Clearance, Close
 from pipeline.model.kinematics import ATTEMPTS, reach
@@ -38,7 +39,7 @@ def check_problem(problem: Problem, moved: bool = False) -> None:
                 f"to {limits.upper[joint]:.4g} {'rad' if turns else 'm'}, and boundary = fixed starts there"
                 + (degrees if turns and abs(value) > TURN else "")
             )
-        for close in Clearance(problem.task.arm, problem.obstacles, problem.own).closest(problem.q_init):
+        for close in _closest(problem) if problem.keeps_clear and too_near(problem, problem.q_init) else ():
             if close.distance < close.margin:
                 raise ConfigError(f"robot.q_init: {_said(close)}, and boundary = fixed starts there")
     if problem.boundary is Boundary.CYCLIC and not problem.closed_path:
@@ -46,6 +47,10 @@ def check_problem(problem: Problem, moved: bool = False) -> None:
         raise PathError(
             f"boundary = cyclic: the path ends {' and '.join(gaps)} from where it starts; a cycle needs a closed path"
         )
+
+
+def _closest(problem: Problem) -> list[Close]:
+    return Clearance(problem.task.arm, problem.obstacles, problem.own).closest(problem.q_init)
 
 
 def _said(close: Close) -> str:

@@ -11,9 +11,9 @@ from pipeline.common.arrays import Array
 from pipeline.common.errors import ConfigError, PathError, RobotError
 from pipeline.config.robot import CollisionConfig
 from pipeline.model.arm import Arm
-from pipeline.model.clearance import Clearance
 from pipeline.model.kernel.chain import Chain
 from pipeline.model.obstacles import Own
+from pipeline.model.places import Places
 from pipeline.problem.problem import Problem
 from pipeline.robot.packages import find
 from pipeline.robot.separation import Solid, depth, distance, solids_of
@@ -65,8 +65,7 @@ def require_free_path(problem: Problem) -> None:
     if arm.base.count or len(problem.task.axes) < 3 or not (pairs or problem.obstacles):
         return
     carried, solids = groups(arm.description), solids_of(arm.description)
-    clearance = Clearance(arm, problem.obstacles, own)
-    around = Around(arm, clearance, solids)
+    around = Around(arm, Places(arm), solids)
     s = np.linspace(0.0, problem.reference.geometry.length, POINTS)
     path = problem.reference.geometry.sample(s)[0]
     tools = [link for link in solids if carried[link] == arm.n]
@@ -83,13 +82,13 @@ class Around:
     """What a path is compared with: where the tool is from the end effector's point, and how deep it is in links."""
 
     arm: Arm
-    clearance: Clearance
+    places: Places
     solids: dict[str, list[Solid]]
 
     def tool(self, links: list[str]) -> float:
         """How far [m] the end effector's point is from the next solid of these links, which move with it."""
         q = np.zeros(self.arm.n)
-        point, at = Solid(self.arm.position(q[None])), self.clearance.places(q)
+        point, at = Solid(self.arm.position(q[None])), self.places(q)
         apart = (distance(point, solid.moved(*at[link]))[1] for link in links for solid in self.solids[link])
         return max(0.0, min(apart, default=np.inf))
 
@@ -101,7 +100,7 @@ class Around:
                 return np.full(len(path), -np.inf)
             low, high = max(description.lower[0], -np.pi), min(description.upper[0], np.pi)
             q[:, 0] = np.linspace(low, high, ANGLES)
-        places = (self.clearance.places(one)[link] for one in q)
+        places = (self.places(one)[link] for one in q)
         seen = np.concatenate([(path - position) @ rotation for rotation, position in places])
         of_each = [depth(solid, seen).reshape(len(q), -1) for solid in self.solids[link]]
         found, first = np.max(of_each, axis=0).min(axis=0), self.arm.first_joint()
@@ -143,10 +142,10 @@ def _always(arm: Arm, own: Own) -> set[Pair]:
     description, rng, left = arm.description, np.random.default_rng(0), set(own.pairs)
     if not left:
         return left
-    clearance, solids = Clearance(arm, None, Own(own.pairs, own.margin)), solids_of(description)
+    places, solids = Places(arm), solids_of(description)
     low, high = np.maximum(description.lower, -np.pi), np.minimum(description.upper, np.pi)
     for q in rng.uniform(low, np.maximum(low, high), (SAMPLES, arm.n)):
-        at = clearance.places(q)
+        at = places(q)
         placed = {link: [solid.moved(*at[link]) for solid in solids[link]] for pair in left for link in pair}
         left = {pair for pair in left if _near(placed[pair[0]], placed[pair[1]], own.margin)}
         if not left:
@@ -154,5 +153,24 @@ def _always(arm: Arm, own: Own) -> set[Pair]:
     return left
 
 
+def too_near(problem: Problem, q: Array) -> bool:
+    """Whether the arm at q (n,) is within a margin of an obstacle or of itself."""
+    at, solids = Places(problem.task.arm)(q), solids_of(problem.task.arm.description)
+    placed = {link: [solid.moved(*at[link]) for solid in of_link] for link, of_link in solids.items()}
+    around, own, carried = problem.obstacles, problem.own, groups(problem.task.arm.description)
+    if around is not None:
+        moving = [solid for link, of_link in placed.items() if carried[link] for solid in of_link]
+        if _near(moving, [Solid.of(shape) for shape in around.shapes], around.margin):
+            return True
+    pairs = own.pairs if own is not None and own.kept else ()
+    return own is not None and any(_near(placed[first], placed[second], own.margin) for first, second in pairs)
+
+
 def _near(first: list[Solid], second: list[Solid], margin: float) -> bool:
-    return any(distance(a, b)[0] < margin for a in first for b in second)
+    return any(_within(a, b, margin) and distance(a, b)[0] < margin for a in first for b in second)
+
+
+def _within(a: Solid, b: Solid, margin: float) -> bool:
+    """Whether the balls around them are so near."""
+    apart = float(np.linalg.norm(a.center - b.center))
+    return apart - a.reach(a.center) - b.reach(b.center) < margin

@@ -58,6 +58,7 @@ def solve(problem: Problem, options: DynamicProgrammingOptions, context: Context
             optimum=rank + 1,
             tracking_tolerance=TRACKING,
             limits_kept=LIMIT_KINDS,
+            clear_between=True,
             evidence=optimum.evidence,
             statistics={**(log if rank == 0 else {}), "solves": optimum.solves},
         )

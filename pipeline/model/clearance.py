@@ -60,11 +60,9 @@ class Clearance:
         model, _ = assemble(self.plant, Parser(self.plant), description, arm.mounting)
         self.names: dict[Any, str] = {}
         self.links: dict[str, list[Any]] = {}
-        self.bodies: dict[str, Any] = {}
         bodies = [self.plant.GetBodyByName(description.drake_name(str(shape.frame)), model) for shape in shapes]
         for body, shape in zip(bodies, shapes, strict=True):
             self.links.setdefault(str(shape.frame), []).append(self._register(body, shape, str(shape.frame)))
-            self.bodies[str(shape.frame)] = body
         others = [self._register(self.plant.world_body(), shape, shape.name) for shape in solids]
         self.plant.Finalize()
         self.diagram = builder.Build()
@@ -102,13 +100,6 @@ class Clearance:
         query = self.scene.get_query_output_port().Eval(self.scene.GetMyContextFromRoot(kind.context))
         found = query.ComputeSignedDistancePairwiseClosestPoints(kind.margin if extent is None else extent)
         return (pair for pair in found if extent is not None or pair.distance < kind.margin)
-
-    def places(self, q: Array) -> dict[str, tuple[Array, Array]]:
-        """Rotation (3, 3) and position (3,) [m] of each link with shapes at q (n,)."""
-        context = self.kinds[0].plant_context
-        self.plant.SetPositions(context, q)
-        poses = {link: body.EvalPoseInWorld(context) for link, body in self.bodies.items()}
-        return {link: (pose.rotation().matrix(), pose.translation()) for link, pose in poses.items()}
 
     def _named(self, pair: Any) -> tuple[str, str]:
         """The link first, an obstacle or the later link second."""

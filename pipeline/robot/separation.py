@@ -111,6 +111,15 @@ def nearest(a: Solid, b: Solid) -> tuple[float, float, Array]:
 
 def depth(solid: Solid, points: Array) -> Array:
     """How deep (K,) [m] points (K, 3) lie inside a solid; not above 0 outside."""
+    beyond_ball = np.linalg.norm(points - solid.center, axis=1) - solid.reach(solid.center)
+    inner = beyond_ball < 0
+    found = -beyond_ball
+    if inner.any():
+        found[inner] = _depth(solid, points[inner])
+    return np.asarray(found)
+
+
+def _depth(solid: Solid, points: Array) -> Array:
     if not (solid.rim or solid.radius):
         sides = ConvexHull(solid.points).equations
         return np.asarray(-(points @ sides[:, :3].T + sides[:, 3]).max(axis=1))

@@ -12,7 +12,14 @@ from hydra.errors import HydraException
 from pipeline.common.errors import InputError
 
 # What else belongs to one arm alone, and what holds where nobody says it.
-NOTHING = {"q_init": "null", "limits": "null", "collision": "null", "locked": "null", "armature": "0.0"}
+NOTHING = {
+    "q_init": "null",
+    "limits": "null",
+    "collision": "file",
+    "srdf": "null",
+    "locked": "null",
+    "armature": "0.0",
+}
 FRAME = {"offset": "[0.0,0.0,0.0]", "offset_rpy": "[0.0,0.0,0.0]", "base": "null"}
 
 

@@ -44,6 +44,7 @@ class Session(Callback):
         with _refusing():
             folder = _given(config, "hydra.run.dir")
             asked = checked(config)
+            print(f"{asked.name}: preparing", flush=True)  # what follows loads Drake
             self.check(asked)
             resume.refuse_another(folder, asked)
             ownership.own(folder)

@@ -88,3 +88,15 @@ def test_motions_are_never_farther_apart_than_half_a_turn(method: str) -> None:
     """With a larger measure of what is the same, no start would differ from the first."""
     with pytest.raises(ConfigError, match=rf"method\.{method}\.same_path = .*: must be a number > 0 and <= 3\.14 rad"):
         composed(f"method.{method}.same_path=1e9")
+
+
+def test_an_optimum_that_was_lost_says_what_it_could_not_meet() -> None:
+    """On which grid, and by how much; of one that the batch has lost there is only its word."""
+    problem = stated("timing.steps=4")
+    q = np.tile(problem.q_init, (5, 1))
+    told = {"intervals": 50, "violation": 2e-3, "optimality": 0.4}
+    refined = [Optimum(q, 1.0, False, "iteration limit", solves=[told]), Optimum(q, 1.0, False, "lost")]
+    said = no_optimum(problem, problem.times, [Optimum(q, 1.0, True, "success")], refined)
+    assert said.startswith("2 optima of the coarse grid were lost on a finer one (")
+    assert "iteration limit on 50 intervals: its constraints hold to 2e-03, its optimality to 4e-01" in said
+    assert "; lost)" in said

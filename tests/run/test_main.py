@@ -218,3 +218,14 @@ def test_mp4_needs_ffmpeg(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
     answer = run("methods=[lsv]", "timing.steps=4", "artifacts.animation=mp4")
     assert_refused(answer, "artifacts.animation = mp4: needs ffmpeg: pip install '.[film]'; gif needs none")
+
+
+def test_files_of_ones_own_are_picked_as_the_projects(run: Run, tmp_path: Path) -> None:
+    folder = tmp_path / "mine" / "experiment"
+    folder.mkdir(parents=True)
+    (folder / "own.yaml").write_text("# @package _global_\nname: own\nseed: 5\n")
+    answer = run("--config-dir", "mine", "+experiment=own", "--cfg", "job")
+    assert answer.code == 0
+    assert {"name: own", "seed: 5"} <= {*answer.out.splitlines()}
+    assert_refused(run("--config-dir", "mine", "+experiment=onw"), "did you mean own?")
+    assert_refused(run("--config-dir", "nowhere", "+experiment=own"), "nowhere' not found")

@@ -47,10 +47,12 @@ def test_what_the_file_says(tmp_path: Path) -> None:
         ("fixed", "hand", "camera", "0 0 1"),
         ("fixed", "hand", "gripper_tcp", "0 0 1"),
         ("fixed", "hand", "cover", "0 0 1"),
+        ("fixed", "hand", "third_finger_tip", "0 0 1"),
     )
     found = said(file)
     assert (found["name"], found["end_effector"], found["task"]) == ('"my_arm"', '"gripper_tcp"', "[x,y,z]")
-    assert (found["q_init"], found["limits"], found["collision"], found["base"]) == ("null",) * 4
+    assert (found["q_init"], found["limits"], found["srdf"], found["base"]) == ("null",) * 4
+    assert found["collision"] == "file"
     line = own_robot.words([f"robot.urdf={file}"])[1]
     assert line.startswith("note: my arm.urdf says no more, so robot.end_effector=gripper_tcp (its last link), ")
     given = said(file, "robot.end_effector=head", "robot.q_init=[0,0]", "++robot.name=nod")

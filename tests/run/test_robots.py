@@ -74,5 +74,7 @@ def test_a_bad_robot_as_a_process(tmp_path: Path) -> None:
     file.write_text(f'<sdf version="1.9"><model name="arm">{model}</model></sdf>', encoding="utf-8")
     answer = command(f"robot.urdf={file}", "robot.end_effector=l3", "robot.q_init=[0.1,0.2,0.3]", folder=tmp_path)
     assert_refused(answer, "robot.urdf", "link 'l1'", "inertia that no body has")
-    assert answer.out == ""
+    note, begins = answer.out.splitlines()
+    assert note.endswith("so robot.task=[x,y] (it moves in a plane)")
+    assert begins == "run: preparing"
     assert [file.name for file in tmp_path.iterdir()] == ["arm.sdf"]

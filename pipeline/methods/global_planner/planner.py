@@ -186,21 +186,28 @@ def as_solution(problem: Problem, optimum: Optimum, options: GlobalOptions) -> S
 
 
 def finish(
-    problem: Problem, times: Array, motions: Array, options: GlobalOptions, context: Context
+    problem: Problem, times: Array, motions: Array, options: GlobalOptions, context: Context, lazy: bool = True
 ) -> tuple[Array, list[Optimum]]:
     """The distinct optima, best first, to which motions (S, N + 1, n) on the knots `times` lead, and the knots that
-    they are on: the problem's, or those that its path needs. Motions that are lost on the way are left out.
+    they are on: the problem's, or those that its path needs. Motions that are lost on the way are left out. lazy: see
+    `by_differences`.
     """
     knots, too_coarse = on_knots(problem, options.refine_to)
     if too_coarse:
         return knots, []
-    problem = replace(problem, times=knots)
+    given, lazy = problem, lazy and keeps_own(problem)
+    problem = replace(without_own(problem) if lazy else problem, times=knots)
     batch = Batch(problem, options) if Batch.without(problem, options) is None else None
     grids = [times, *(grid for grid in refinement(knots, len(times)) if len(grid) > len(times))]
     starts = _optimise_starts(problem, times, options, motions, batch, context)
     chosen = basins(problem, times, starts, options.same_path).optima
     problem, _, refined = _to_the_end(problem, grids, options, chosen, batch, context)
     good = [optimum for optimum in refined if _good(optimum)]
+    if lazy and good:
+        problem = replace(given, times=problem.times)
+        good = [optimum for optimum in apart(problem, good, options, context) if _good(optimum)]
+        if not good:
+            return finish(given, times, motions, options, context, lazy=False)
     return problem.times, basins(problem, problem.times, good, options.same_path).optima
 
 

@@ -55,7 +55,7 @@ def no_feasible(starts: int, relaxed: Relaxed) -> str:
 def no_optimum(problem: Problem, grid: Array, starts: list[Optimum], refined: list[Optimum], jumping: int = 0) -> str:
     """There are starts, on `grid`, but no optimum: why, in the solver's own words. `jumping` were not refined."""
     if any(start.converged for start in starts):
-        fates = {optimum.status if not optimum.converged else "jumps between branches" for optimum in refined}
+        fates = {_fate(optimum) if not optimum.converged else "jumps between branches" for optimum in refined}
         fates |= {"jumps between branches"} if jumping else set()
         lost = len(refined) + jumping
         return (
@@ -67,6 +67,19 @@ def no_optimum(problem: Problem, grid: Array, starts: list[Optimum], refined: li
         f"none of {len(starts)} starts converged (most often: {words}){_nearest(problem, grid, starts)}; "
         f"try more iterations (method.global.max_iterations), {OTHERS}"
     )
+
+
+def unmet(status: str, violation: float, optimality: float) -> str:
+    """How a solve ended that did not converge, with what it could not meet and by how much."""
+    return f"{status}: its constraints hold to {violation:.0e}, its optimality to {optimality:.0e}"
+
+
+def _fate(optimum: Optimum) -> str:
+    told = optimum.solves[-1] if optimum.solves else {}
+    if "optimality" not in told:
+        return optimum.status
+    words = f"{optimum.status} on {told['intervals']} intervals"
+    return unmet(words, told["violation"], told["optimality"])
 
 
 def _nearest(problem: Problem, grid: Array, starts: list[Optimum]) -> str:

@@ -16,7 +16,7 @@ from pipeline.config.methods import GlobalOptions
 from pipeline.methods.global_planner.apart import keeps_own, short, without_own
 from pipeline.methods.global_planner.grids import finer, off_path, served
 from pipeline.methods.global_planner.optimum import confirmed
-from pipeline.methods.global_planner.reasons import counted
+from pipeline.methods.global_planner.reasons import counted, unmet
 from pipeline.methods.method import Context
 from pipeline.problem.limits import FREE, LIMIT_KINDS
 from pipeline.problem.problem import Boundary, Problem
@@ -249,10 +249,17 @@ def _refine(problem: Problem, options: GlobalOptions, motion: Array) -> Smooth:
     if solved.outcome.converged:
         solver.confirm(solved)
     kept = all(float(excess.max()) <= ENOUGH for excess in excesses(problem, solved.curve).values())
-    status = solved.outcome.status if kept or not solved.outcome.converged else "exceeds a limit between its knots"
+    status = _status(solved, kept)
     good = kept and solved.outcome.converged
     curve = solved.curve if good or solver.last is None else solver.last
     return Smooth(curve, good, status, objective(problem, curve), solver.solves)
+
+
+def _status(solved: Solved, kept: bool) -> str:
+    """IPOPT's word for how a solve ended; where it has not converged, with what it could not meet and by how much."""
+    if solved.outcome.converged:
+        return solved.outcome.status if kept else "exceeds a limit between its knots"
+    return unmet(f"{solved.outcome.status} on {len(solved.curve.times) - 1} intervals", *solved.residuals())
 
 
 def shortest(context: tuple[Problem, GlobalOptions], start: Curve) -> Smooth:

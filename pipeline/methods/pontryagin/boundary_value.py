@@ -50,6 +50,9 @@ FASTEST = 12.0  # [rad] of self-motion within the motion time
 ASTRAY = 0.5  # [rad] between a coarsely integrated shot and the path: the shot met a singularity
 
 
+ENDS = 100  # times the tolerance, that a solve may leave of the conditions at the ends
+
+
 LARGEST = 1e8  # a Newton step may go far astray; Drake must not see what is not finite
 
 
@@ -181,26 +184,30 @@ def _collocate(problem: Problem, times: Array, guess: Array, tolerance: float, n
     task, n = problem.task, problem.task.arm.n
     lagrangian = Lagrangian(task, problem.objective)
     start = problem.reference.position(np.zeros(1))
-    basis = null_space(task.jacobian(guess[:n, :1].T))[0]
+
+    def across(y: Array) -> Array:  # the null space where states (2 n, K) begin
+        return null_space(task.jacobian(np.clip(np.nan_to_num(y[:n, :1].T), -LARGEST, LARGEST)))[0]
 
     def flow(t: Array, y: Array) -> Array:
         y = np.clip(np.nan_to_num(y), -LARGEST, LARGEST)
         qd, slope = rates(lagrangian, problem.reference.sample(t)[1], y[:n].T, y[n:].T)
         return np.vstack([qd.T, slope.T])
 
-    def ends(first: Array, last: Array) -> Array:
+    def ends(first: Array, last: Array, along: Array = across(guess)) -> Array:
         if problem.boundary is Boundary.FIXED:
             return np.concatenate([first[:n] - problem.q_init, last[n:]])
         q = np.clip(np.nan_to_num(first[:n]), -LARGEST, LARGEST)[None]
         x, jacobian = task.error_and_jacobian(q, start)
         free = first[n:] - pseudoinverse(jacobian[0]) @ jacobian[0] @ first[n:]
-        return np.concatenate([x[0], basis.T @ free, last[n:]])
+        return np.concatenate([x[0], along.T @ free, last[n:]])
 
     with np.errstate(all="ignore"):  # of guesses that lead nowhere
         result = solve_bvp(flow, ends, times, guess, tol=tolerance, max_nodes=nodes)
-    residual = float(max(result.rms_residuals.max(), np.abs(ends(result.y[:, 0], result.y[:, -1])).max()))
+    # A solve may end where the null space is orthogonal to that of its guess, along which transversality was asked for.
+    left = np.abs(ends(result.y[:, 0], result.y[:, -1], across(result.y))).max()
+    residual = float(max(result.rms_residuals.max(), left))
     statistics: dict[str, Any] = {"nodes": result.x.size, "iterations": result.niter, "residual": residual}
-    good = result.success and np.isfinite(result.y).all()
+    good = result.success and np.isfinite(result.y).all() and left < ENDS * tolerance
     if good:
         statistics |= {
             "integral": _integral(lagrangian, problem, result.sol, result.x),
