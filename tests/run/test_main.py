@@ -24,7 +24,7 @@ REFUSED = {
     "robot option": (["robot=unknown"], ["robot", "unknown", "planar3r", "planar3r_printed"]),
     "boundary option": (["boundary=closed"], ["boundary", "closed", "cyclic", "fixed", "free"]),
     "experiment": (["+experiment=traj9"], ["experiment", "traj9", "traj1", "traj4", "sim1"]),
-    "hidden option": (["robot=_common"], ["robot = _common", "no such option", "allowed: panda, planar3r"]),
+    "hidden option": (["robot=_common"], ["robot = _common", "no such option", "allowed: kinova, panda, planar3r"]),
     "hidden experiment": (["-m", "+experiment=sim1,_sim"], ["experiment = _sim", "no such option"]),
     "closest option": (["robot=pandda"], ["robot = pandda", "did you mean panda?"]),
     "sweeper": (["-m", "hydra/sweeper=bayes"], ["hydra/sweeper = bayes", "allowed: basic", "pip install '.[optuna]'"]),
