@@ -31,5 +31,5 @@ def test_the_notebook_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
     speeds = table.filter(like="_velocity").to_numpy()
     np.testing.assert_allclose(speeds[[0, -1]], 0.0, atol=1e-9)  # rests at both ends
     axes = mpl.pyplot.gca()
-    assert [line.get_label() for line in axes.get_lines()] == ["lsv: singular", "global: solved"]
+    assert [line.get_label() for line in axes.get_lines()] == ["lsv: solved", "global: solved"]
     mpl.pyplot.close("all")
