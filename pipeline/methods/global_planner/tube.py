@@ -70,7 +70,7 @@ def _loosen(context: tuple[Problem, GlobalOptions], motion: Array) -> Optimum:
         reference = replace(problem.reference, tolerance=tolerance, orientation_tolerance=orientation)
         optimum = optimise(replace(problem, reference=reference), problem.times, motion, options)
         solves += optimum.solves
-        beyond = np.array(off_path(problem, optimum.q)) / asked
+        beyond = off_path(problem, optimum.q).max(axis=1) / asked
         if not optimum.converged or beyond.max() <= 1:
             break
         allowed = np.where(beyond > 1, allowed / (np.maximum(beyond, 1.0) * (1 + ROOM)), allowed)
