@@ -8,7 +8,7 @@ export OMP_NUM_THREADS := 1
 export PYTHONDONTWRITEBYTECODE :=
 
 .DEFAULT_GOAL := help
-.PHONY: help lines run reproduce audit readings test fast lint format cover bench package docs pictures clean schema
+.PHONY: help lines run reproduce audit readings test fast lint format cover bench package docs pictures clean schema suite
 
 help: ## this list
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
@@ -16,7 +16,7 @@ help: ## this list
 run: $(VENV)/.installed ## set up, then run the third trajectory of the PMKE paper
 	$(BIN)/python -m pipeline +experiment=traj3
 
-reproduce: $(VENV)/.installed-dev ## every printed number and figure of the documents, side by side (outputs/reproduction/), every erratum
+reproduce: $(VENV)/.installed-dev ## every printed number and figure of the documents, side by side, and every erratum
 	$(BIN)/python -m pipeline.reproduce
 	$(BIN)/python -m tests.reproduce.errata
 
@@ -59,6 +59,9 @@ lines: $(VENV)/.installed-dev ## 30 random lines of the Panda: does any motion t
 
 docs: $(VENV)/.installed-dev ## the reference of the public names as a static site, outputs/docs/index.html
 	$(BIN)/pdoc --output-directory outputs/docs --docformat google pipeline
+
+suite: $(VENV)/.installed-dev ## solve the problems of tests/suite/problems and write their table (outputs/suite/)
+	$(BIN)/python -m pipeline.suite tests/suite/problems
 
 clean: ## remove the environment and all caches, keep outputs/
 	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache .coverage build dist

@@ -35,6 +35,9 @@ NEAR = 0.05  # [rad] a seed this close to a traced loop, running the same way, l
 MOST_STEPS = 4000
 
 
+SHIFTS = (0.2, -0.2, 0.4, -0.4)  # of the spacing of nodes
+
+
 NUDGE = 1e-9  # [m] from a critical task point to one with a regular manifold
 
 
@@ -270,6 +273,16 @@ def _resample(task: Task, x: Array, traced: list[list[Loop]], spacing: float) ->
     ]
     target = np.repeat(x, [sum(of_point) for of_point in counts], axis=0)
     q, on = close_gap(task, np.concatenate(rough), target, steps=30, tolerance=CLOSED)
+    for shift in SHIFTS:  # a node at a singular configuration gives way to one beside it
+        if on.all():
+            break
+        beside = [
+            loop.interpolate(s + shift * loop.length / len(s))
+            for loops, all_s in zip(traced, even, strict=True)
+            for loop, s in zip(loops, all_s, strict=True)
+        ]
+        lost = np.flatnonzero(~on)
+        q[lost], on[lost] = close_gap(task, np.concatenate(beside)[lost], target[lost], steps=30, tolerance=CLOSED)
     if not on.all():
         raise PathError(f"the self-motion manifold was lost at the task point {target[~on][0]}, where it was sampled")
     ways = tangent(task.jacobian(q))

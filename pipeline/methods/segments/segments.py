@@ -26,6 +26,8 @@ from pipeline.search.continuity import Components, components, fewest, motions, 
 from pipeline.search.manifold import Manifold
 
 WAYS = 16  # of a piece, from which its optimum is sought
+MOST_TIMES = 8  # so many times the nodes that are asked for, where fewer leave cuts
+STEADY = 2  # doublings after one another that leave no fewer cuts
 FEWEST = 20  # intervals of a piece, and of a tool path on which it is cut
 
 
@@ -76,8 +78,7 @@ def solve(problem: Problem, options: SegmentsOptions, context: Context) -> list[
         context.phase("seeking where the path must be cut")
         tool_path = _part(problem, first, last, len(pieces) == 0, problem.q_init)
         count = max(FEWEST, round(options.intervals * (last - first) / length))
-        found = components(tool_path, count, options.nodes, rng)
-        cuts = fewest(found)
+        found, cuts = _cut(tool_path, count, options, rng)
         if cuts is None:
             return [_nothing(problem, found, first)]
         pieces += _pieces(found, cuts, first, Manifold(tool_path))
@@ -108,12 +109,30 @@ def refuses(problem: Problem, options: SegmentsOptions) -> str | None:
 segments = Method(
     "segments",
     "Pieces",
-    "#6B46C1",
+    "#97266D",
     SegmentsOptions,
     Serves(boundaries=frozenset({Boundary.FIXED, Boundary.FREE}), moving_base=False, breaks=True),
     solve,
     refuses,
 )
+
+
+def _cut(
+    problem: Problem, count: int, options: SegmentsOptions, rng: np.random.Generator
+) -> tuple[Components, list[tuple[int, int]] | None]:
+    """The cuts of one tool path, with twice as many nodes and again while that leaves fewer of them."""
+    found = components(problem, count, options.nodes, rng)
+    cuts = fewest(found)
+    nodes, kept = options.nodes, 0
+    while cuts != [] and nodes < MOST_TIMES * options.nodes and kept < STEADY:
+        nodes *= 2
+        finer = components(problem, count, nodes, rng)
+        again = fewest(finer)
+        fewer = again is not None and (cuts is None or len(again) < len(cuts))
+        kept = 0 if fewer else kept + 1
+        if fewer:
+            found, cuts = finer, again
+    return found, cuts
 
 
 def _part(problem: Problem, start: float, end: float, first: bool, q: Array) -> Problem:
