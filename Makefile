@@ -8,7 +8,7 @@ export OMP_NUM_THREADS := 1
 export PYTHONDONTWRITEBYTECODE :=
 
 .DEFAULT_GOAL := help
-.PHONY: help run reproduce audit readings test fast lint format cover bench package docs pictures clean schema suite
+.PHONY: help lines run reproduce audit readings test fast lint format cover bench package docs pictures clean schema suite
 
 help: ## this list
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
@@ -53,6 +53,9 @@ bench: $(VENV)/.installed-dev ## time the solver side by side with CasADi (the t
 
 package: $(VENV)/.installed-dev ## sdist and wheel, tried in an environment of their own from another folder
 	sh tests/package.sh $(BIN)/python
+
+lines: $(VENV)/.installed-dev ## 30 random lines of the Panda: does any motion touch the arm itself, by coal, and what does that cost
+	$(BIN)/python -m tests.suite.lines
 
 docs: $(VENV)/.installed-dev ## the reference of the public names as a static site, outputs/docs/index.html
 	$(BIN)/pdoc --output-directory outputs/docs --docformat google pipeline

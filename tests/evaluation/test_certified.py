@@ -49,6 +49,25 @@ def test_never_above_the_truth_and_near_it(which: str, clearance: Clearance, cur
     assert found.bound / 2 <= early.bound <= found.distance
 
 
+def test_no_piece_comes_nearer_than_its_bound(clearance: Clearance, rng: np.random.Generator) -> None:
+    """Of motions that turn sharply, where straight on would be too good; on short pieces the plane is the sharper."""
+    start, pairs, sharper = np.array(composed("robot=panda").robot.q_init), clearance.own, 0
+    bend = CubicSpline(KNOTS, start + 0.8 * rng.normal(size=(9, 7)))
+    motion = certified.Motion(clearance, pairs, bend, KNOTS)
+    for _ in range(30):
+        p, begin, width = int(rng.integers(len(pairs))), float(rng.integers(8)), 0.5 ** int(rng.integers(6))
+        piece = certified.Piece(p, begin, begin + width)
+        cut = begin + width / 2
+        motion.go(cut)
+        apart = clearance.apart(pairs[p])
+        bound = motion.bound(pairs[p], piece, cut, apart)
+        by_way = apart[0] - max(float(motion.reach[p] @ motion.way(*e)) for e in ((begin, cut), (cut, begin + width)))
+        sharper += bound > by_way
+        true = clearance.smallest([pairs[p]], bend(motion.time(begin) + width * 0.25 * np.linspace(0.0, 1.0, 9)))
+        assert bound <= true.min() + 1e-9
+    assert sharper > 5
+
+
 def test_reaches_hold_for_every_configuration(clearance: Clearance, rng: np.random.Generator) -> None:
     """No point of a solid moves by more than rho |dq_j| where one joint turns."""
     pair = max(clearance.own, key=lambda pair: pair.second.joints - pair.first.joints)
