@@ -35,26 +35,12 @@ from pipeline.problem.solution import Solution, Status, Trajectory
 from pipeline.program.feasibility import Relaxed, least_violation
 
 TRACKING = 1e-8  # [m] what an optimum must keep at every knot
-
-
 ELASTIC_STARTS = 3  # from how many motions IPOPT seeks a motion, and the least violation, when Newton found none
-
-
 FEWER = 12  # starts on a finer grid after none succeeded on the coarse one
-
-
 STEPS = 25  # intervals of the coarsest grid: 12 miss optima
-
-
 STEPS_ALONE = 12  # where each start costs a solve of its own
-
-
 DEAREST = 3.5  # times the best: dearer optima are not refined, nor does it count that they are new
-
-
 MOST_SOLVED = 30_000  # intervals of all starts on the coarsest grid: on a longer one there are fewer
-
-
 HOPELESS = 0.1  # relative violation on a coarse grid from which on finer ones are not tried
 
 
