@@ -16,7 +16,7 @@ help: ## this list
 run: $(VENV)/.installed ## set up, then run the third trajectory of the PMKE paper
 	$(BIN)/python -m pipeline +experiment=traj3
 
-reproduce: $(VENV)/.installed-dev ## every printed number and figure of the documents, side by side (outputs/reproduction/), every erratum
+reproduce: $(VENV)/.installed-dev ## every printed number and figure of the documents, side by side, and every erratum
 	$(BIN)/python -m pipeline.reproduce
 	$(BIN)/python -m tests.reproduce.errata
 

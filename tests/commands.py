@@ -49,11 +49,13 @@ def call(
     return Answer(code, *(capfd.readouterr() if capfd is not None else ("", "")))
 
 
-def command(*words: str, folder: Path) -> Answer:
-    """The command line as a process of its own, started in `folder`."""
+def command(*words: str, folder: Path, module: str = "pipeline") -> Answer:
+    """The command line as a process of its own, started in `folder`; `module`: tests.plain where nobody looks at the
+    pictures.
+    """
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
     done = subprocess.run(
-        [sys.executable, "-m", "pipeline", *words],
+        [sys.executable, "-m", module, *words],
         cwd=folder,
         env=environment,
         capture_output=True,

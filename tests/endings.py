@@ -36,13 +36,13 @@ GONE = 2.0  # [s] by when every process has left
 SAID = "error: terminated; what is finished is kept, start again to go on\n"
 
 
-def begin(*words: str, cwd: Path) -> subprocess.Popen[str]:
+def begin(*words: str, cwd: Path, module: str = "pipeline") -> subprocess.Popen[str]:
     """The command line, with its workers in a session of its own and its temporary files in `cwd`/temporary."""
     temporary = cwd / "temporary"
     temporary.mkdir(exist_ok=True)
     places = {"PYTHONPATH": str(ROOT), "TMPDIR": str(temporary), "JOBLIB_TEMP_FOLDER": str(temporary)}
     return subprocess.Popen(
-        [sys.executable, "-m", "pipeline", *words],
+        [sys.executable, "-m", module, *words],
         cwd=cwd,
         env={**os.environ, "OMP_NUM_THREADS": "1", **places},
         stdout=subprocess.DEVNULL,

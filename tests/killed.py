@@ -1,6 +1,6 @@
 """The command line, killed as by `kill -9` in the midst of a write: python -m tests.killed FOLDER COUNT WORDS...
 
-COUNT results are kept below a folder of that name before; of the next one half is written.
+COUNT results are kept below a folder of that name before; of the next one half is written. Nothing is drawn.
 """
 
 from __future__ import annotations
@@ -15,7 +15,8 @@ from typing import Any
 
 from pipeline.common import workers
 from pipeline.common.files import write_beside
-from pipeline.run.main import main
+from pipeline.run.main import run_job
+from tests.plain import job
 from tests.support import ROOT
 
 
@@ -45,4 +46,4 @@ def _write_until(folder: str, count: int) -> Callable[[Path, Callable[[Path], An
 if __name__ == "__main__":
     name, number, *sys.argv[1:] = sys.argv[1:]
     workers.write_beside = _write_until(name, int(number))
-    sys.exit(main())
+    sys.exit(run_job(job))

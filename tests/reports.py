@@ -9,7 +9,6 @@ from functools import cache
 import numpy as np
 import pytest
 
-from pipeline.artifacts.artifacts import ARTIFACTS, name
 from pipeline.artifacts.report import Report
 from pipeline.config.run import RunConfig
 from pipeline.evaluation.evaluation import Evaluation, evaluate
@@ -25,6 +24,7 @@ from pipeline.problem.solution import Solution, Status, Trajectory
 from pipeline.robot.shapes import Shape
 from pipeline.run import run
 from pipeline.studies.study import Motions, Result
+from tests.plain import PLAIN
 from tests.support import with_shapes
 
 TIMES = np.linspace(0.0, 2.0, 5)
@@ -43,10 +43,7 @@ def report_of(
 
 def leave_out_pictures(patch: pytest.MonkeyPatch) -> None:
     """Runs then draw and record nothing: that takes most of the time of a small one."""
-    kept = tuple(
-        artifact for artifact in ARTIFACTS if name(artifact) not in ("page", "figures", "recording", "animation")
-    )
-    patch.setattr(run, "ARTIFACTS", kept)
+    patch.setattr(run, "ARTIFACTS", PLAIN)
 
 
 @cache

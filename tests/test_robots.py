@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 from pipeline.build.problem import prepare
 from pipeline.common.files import shipped
 from pipeline.config.methods import CalculusOfVariationsOptions
+from pipeline.evaluation.clearance import Clearance
 from pipeline.evaluation.evaluation import evaluate
 from pipeline.methods.calculus_of_variations.stationary import calculus_of_variations
 from pipeline.methods.global_planner.planner import global_planner
@@ -30,6 +31,7 @@ from pipeline.problem.problem import Boundary, Problem
 from pipeline.problem.solution import Status
 from pipeline.program.transcription import transcribe
 from pipeline.robot.mounting import Mounting
+from pipeline.robot.shapes import Shape
 from pipeline.search.population import population
 from pipeline.search.selection import diverse
 from tests.benchmarks.peer import PlanarArm, kinetic_energy_program, solve
@@ -221,3 +223,26 @@ def test_pmke_and_pointing() -> None:
     assert np.abs(rotation[-1][:, 2] - rotation[0][:, 2]).max() < 1e-8
     cost = objective_values(replace(problem, limits=None), problem.times, judged.q[None])[0]
     assert cost == pytest.approx(judged.objective, rel=1e-9)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "freedom", "words"),
+    [("ur5", 1, ("robot.orientation=pointing",)), ("kinova", 3, ()), ("tiago", 4, ("methods=[global]",))],
+)
+def test_other_arms_keep_off_a_ball_and_themselves(name: str, freedom: int, words: tuple[str, ...]) -> None:
+    """The ball is 3 cm from where the arm begins, beside the path."""
+    line = ("path.direction=[0,0,-1]", "path.length=0.1", "timing.duration=3", "timing.steps=8", "boundary.rest=[]")
+    problem = prepare(composed(f"robot={name}", "path.tolerance=0.001", *line, *words))
+    assert problem.task.arm.n - problem.task.m == freedom
+    assert problem.own is not None
+    assert problem.own.kept
+    start = problem.reference.position(np.zeros(1))[0]
+    point = Shape("ball", "sphere", (0.001,), tuple(map(float, start[:3] + 0.3 * np.eye(3)[2])))
+    away = float(Clearance(problem.task.arm, Obstacles((point,), 0.02))(problem.q_init[None]).min())
+    around = replace(problem, obstacles=Obstacles((replace(point, size=(away - 0.029,)),), 0.02))
+    best = evaluate(around, global_planner(around, replace(FEW, optimised=2, refine_to=None))[0])
+    assert best.status is Status.SOLVED, best.message
+    assert best.clearance[0] == pytest.approx(0.03, abs=1e-5)
+    assert best.clearance_between >= 0.02
+    assert best.near.own.bound >= problem.own.margin

@@ -2,25 +2,20 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from pathlib import Path
 
+import yaml
 from hydra.core.override_parser.overrides_parser import OverridesParser
 from hydra.core.override_parser.types import Override
 from hydra.errors import HydraException
 
 from pipeline.common.errors import InputError
+from pipeline.common.files import shipped
 
-# What else belongs to one arm alone, and what holds where nobody says it.
-NOTHING = {
-    "q_init": "null",
-    "limits": "null",
-    "collision": "file",
-    "srdf": "null",
-    "locked": "null",
-    "armature": "0.0",
-}
-FRAME = {"offset": "[0.0,0.0,0.0]", "offset_rpy": "[0.0,0.0,0.0]", "base": "null"}
+# What else belongs to one arm alone; where nobody says it, what conf/robot/_common.yaml does.
+BELONGS = ("limits", "srdf", "collision", "locked", "armature", "offset", "offset_rpy", "base")
 
 
 def words(asked: Sequence[str]) -> tuple[list[str], str]:
@@ -44,12 +39,14 @@ def words(asked: Sequence[str]) -> tuple[list[str], str]:
     except (InputError, OSError):
         return [], ""
     task = "[x,y]" if flat else "[x,y,z]"
-    own = {"name": f'"{_name(file)}"', "end_effector": f'"{tip}"', "task": task, **NOTHING, **FRAME}
+    own = {"name": f'"{_name(file)}"', "end_effector": f'"{tip}"', "task": task, "q_init": "null"}
+    common = yaml.safe_load((shipped("conf") / "robot" / "_common.yaml").read_text(encoding="utf-8"))
+    own |= {key: json.dumps(common[key]) for key in BELONGS}
     own = {key: value for key, value in own.items() if f"robot.{key}" not in given}
     said = {
         "end_effector": f"end_effector={tip} (its last link)",
         "task": f"task={task}" + (" (it moves in a plane)" if flat else ""),
-        "q_init": "q_init=null (the middle of the joints' ranges)",
+        "q_init": "q_init=null (sought for a path in the world, else the middle of the joints' ranges)",
     }
     taken = [line for key, line in said.items() if key in own]
     line = f"note: {file.name} says no more, so robot.{', robot.'.join(taken)}" if taken else ""

@@ -21,6 +21,7 @@ from pipeline.config.messages import unknown_key, unknown_option
 from pipeline.config.options import HIDDEN, chosen, options
 
 UNKNOWN = r"Could not (?:override|append to config\.?[^']*|find) '([^']+)'"
+EXTRAS = {"hydra/sweeper": "optuna", "hydra/launcher": "launchers"}  # plugins of Hydra are extras of the package
 GROUP = r"\+?[a-z_/]+=[\w,]+"  # a word that may pick an option
 
 
@@ -67,7 +68,8 @@ def in_one_line(error: Exception) -> str:
     if isinstance(error, MissingConfigException) and error.missing_cfg_file:
         group, _, option = error.missing_cfg_file.rpartition("/")
         allowed = sorted(name for name in error.options or [] if not name.startswith(HIDDEN))
-        return unknown_option(group or "config", option, allowed)
+        brought = f"; pip install '.[{EXTRAS[group]}]' brings more" if group in EXTRAS else ""
+        return unknown_option(group or "config", option, allowed) + brought
     message = str(error.__cause__ or error)
     if isinstance(error, OverrideParseException):
         message = _quoted(error.override) or f"in {' '.join(sys.argv[1:])}: {error}"

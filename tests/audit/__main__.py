@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -45,6 +46,9 @@ def text(table: pd.DataFrame) -> str:
             "experiments through pinocchio and coal, which share nothing with Drake. By how much the tables differ: "
             "place of the end effector, its largest distance from its path, clearance and pose of a floating base "
             "(from zero momentum) in m and rad, torques and integrals relative.",
+            "",
+            f"{len(table)} motions of {table['experiment'].nunique()} experiments, made with Drake {version('drake')}, "
+            f"recomputed with pinocchio {version('pin')} and coal {version('coal')}; allowed is {ALLOWED:.0e}.",
             "",
             *markdown_table([list(table.columns), *shown]),
             "",

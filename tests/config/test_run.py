@@ -101,7 +101,7 @@ def test_every_option_of_every_group(option: str) -> None:
             assert plain(made)[key] == value, key
     assert set(composed(option)[group]) == {field.name for field in dataclasses.fields(made)}
     # What an option leaves alone is the default of its kind: only what the option is for may differ.
-    mounted = {"end_effector", "task", "armature", "srdf", "limits"}
+    mounted = {"end_effector", "task", "armature", "srdf", "limits", "locked"}
     own_words = {
         "robot": {"name", "urdf", "q_init", *mounted},
         "timing": {"law"},

@@ -14,11 +14,12 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from pipeline.common.errors import InputError
 from pipeline.config.documents import half_width
 from pipeline.config.found import EndEffector, Mass, Peak, Simple, SpectralRatio, Summary, Validation
 from pipeline.reproduce.__main__ import FOLDER
 from pipeline.reproduce.recompute import Runs, recompute
-from pipeline.reproduce.results import ResultError, Results
+from pipeline.reproduce.results import Results
 
 ROOT = Path(__file__).resolve().parents[2]
 ENERGY, PRINTED, TRUE = "kinetic_energy_integral", "pontryagin_as_printed", "pontryagin"
@@ -90,7 +91,7 @@ def wrong(numbers: Sequence[tuple[Simple, str]], runs: Runs) -> list[str]:
         printed = re.split(r"[ (]", said)[-1]
         try:
             value = recompute(number, runs)
-        except ResultError as error:
+        except InputError as error:
             found.append(f"{said}: {error}")
             continue
         if said not in whole or not abs(value - float(printed)) <= half_width(printed) * (1 + 1e-9):

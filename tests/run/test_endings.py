@@ -48,7 +48,7 @@ def test_a_run_that_is_ended_goes_on(
     words = (*WHAT[what], f"parallel.workers={workers}", placed(what, folder))
     at_work = folder / "1_sim1" if what == "sweep" else folder
     store = at_work / UNFINISHED
-    running = begin(*words, cwd=tmp_path)
+    running = begin(*words, cwd=tmp_path, module="tests.plain")
     wait_until(lambda: len(kept(store)) >= 3 or running.poll() is not None)
     assert running.poll() is None
     said, took = end(running, signal.SIGTERM)

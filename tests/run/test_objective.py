@@ -11,6 +11,7 @@ import yaml
 
 from pipeline.run.objective import numbers
 from tests.commands import Run
+from tests.reports import leave_out_pictures
 
 TABLE = """method,optimum,kinetic_energy_integral,peak_torque_1,peak_torque_2,min_clearance_between
 lsv,1,0.5,7,9,
@@ -38,8 +39,6 @@ def test_a_run_without_a_motion_is_the_worst(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_a_sweeper_optimises(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Optuna's, over the motion time: its best value is the least of the runs' own; exit codes stay."""
-    from tests.reports import leave_out_pictures
-
     leave_out_pictures(monkeypatch)
     optuna = [
         "hydra/sweeper=optuna",

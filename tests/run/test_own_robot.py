@@ -7,8 +7,10 @@ from pathlib import Path
 import pytest
 import yaml
 
+from pipeline.config.robot import RobotConfig
 from pipeline.run import own_robot
 from tests.commands import Run
+from tests.support import composed
 
 LINK = (
     '<link name="{0}"><inertial><mass value="1"/>'
@@ -51,8 +53,10 @@ def test_what_the_file_says(tmp_path: Path) -> None:
     )
     found = said(file)
     assert (found["name"], found["end_effector"], found["task"]) == ('"my_arm"', '"gripper_tcp"', "[x,y,z]")
-    assert (found["q_init"], found["limits"], found["srdf"], found["base"]) == ("null",) * 4
-    assert found["collision"] == "file"
+    robot, nobodys = composed(*(f"robot.{key}={value}" for key, value in found.items())).robot, RobotConfig()
+    assert (robot.name, robot.end_effector, robot.q_init) == ("my_arm", "gripper_tcp", None)
+    for key in ("limits", "srdf", "collision", "locked", "armature", "offset", "base"):
+        assert getattr(robot, key) == getattr(nobodys, key)
     line = own_robot.words([f"robot.urdf={file}"])[1]
     assert line.startswith("note: my arm.urdf says no more, so robot.end_effector=gripper_tcp (its last link), ")
     given = said(file, "robot.end_effector=head", "robot.q_init=[0,0]", "++robot.name=nod")

@@ -214,7 +214,7 @@ def test_launchers(launcher: tuple[str, str], sweep: Sweep, tmp_path: Path) -> N
     name, option = launcher
     pytest.importorskip(f"hydra_plugins.hydra_{name.removesuffix('_local')}_launcher")
     words = [*LSV, "path.length=0.1,3.0", f"hydra/launcher={name}", option, "parallel.workers=1"]
-    answer = command(*words, folder=tmp_path)
+    answer = command(*words, folder=tmp_path, module="tests.plain")
     assert answer.code == 2, answer
     rows = table(tmp_path)
     assert list(rows["run"]) == ["0_traj1", "1_traj1"]

@@ -243,7 +243,7 @@ def _refine(problem: Problem, options: GlobalOptions, motion: Array) -> Smooth:
             guess = Curve.through(problem, grid, solved.curve(grid), solved.curve.ends)
             solved = solver.lazily(problem, guess) if loose else solver.whole(problem, guess)
     if solved.outcome.converged:
-        solved, further = tighten(problem, solved, short, **solver.given)
+        solved, further = tighten(problem, solved, short, guess, **solver.given)
         for one in further:
             solver.note(one)
     if solved.outcome.converged:

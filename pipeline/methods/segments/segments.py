@@ -109,7 +109,7 @@ def refuses(problem: Problem, options: SegmentsOptions) -> str | None:
 segments = Method(
     "segments",
     "Pieces",
-    "#6B46C1",
+    "#97266D",
     SegmentsOptions,
     Serves(boundaries=frozenset({Boundary.FIXED, Boundary.FREE}), moving_base=False, breaks=True),
     solve,

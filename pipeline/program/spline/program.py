@@ -28,9 +28,9 @@ SMALL_WITH_TORQUE = 3e-3
 EASY = {"spral_nemin": 1, "limited_memory_max_history": 4}
 
 
-# Of IPOPT in a tube: where most knots touch its wall, slacks of 1e-11 leave rounding errors of 1e-6 in its optimality
-# for hundreds of iterations; with 1e-9 the objective is as good to seven digits.
-TUBE = {"mu_min": 1e-9, "acceptable_iter": 5}
+# Of IPOPT in a tube: most knots touch its wall. A barrier that only falls does not send them to and fro, and one that
+# falls to 1e-11 leaves rounding errors of 1e-6 in the optimality for hundreds of iterations.
+TUBE = {"mu_strategy": "monotone", "mu_init": 1e-4, "mu_min": 1e-9, "acceptable_iter": 5}
 
 
 @dataclass(frozen=True)

@@ -129,22 +129,27 @@ def without_forces(problem: Problem) -> Problem:
 Short = Callable[[Problem, Curve], float]  # how far [m] a spline comes within the margins that it has to keep
 
 
-def tighten(problem: Problem, first: Solved, short: Short, **options: object) -> tuple[Solved, list[Solved]]:
+def tighten(
+    problem: Problem, first: Solved, short: Short, begin: Curve | None = None, **options: object
+) -> tuple[Solved, list[Solved]]:
     """The optimum that keeps its limits between the knots as well as at them, and all solves after the first.
 
     Where a limit is exceeded in an interval its bounds at both knots are divided by that excess and a little more; from
     round to round by more of it, since what lies between two knots may give way by less than they do. Of the shortest
-    motion the time changes with them.
+    motion the time changes with them. begin: where `first` came from, on its knots; what comes too near to something is
+    solved again from there: from where it touches IPOPT may be long in finding another way round.
     """
     solved, further, tightened = first, [], Tightened.none(problem, first.curve.times)
     for count in range(ROUNDS):
         posed, curve = solved.timed(problem).slowed(solved.stretch), solved.curve.stretched(solved.stretch)
-        stricter = _stricter(posed, curve, tightened, 1.0 + count, short(posed, curve))
+        lacking = short(posed, curve)
+        stricter = _stricter(posed, curve, tightened, 1.0 + count, lacking)
         if stricter is None or not solved.outcome.converged:
             break
         tightened = stricter
         stretch = 0.0 if solved.program.stretch is None else solved.stretch
-        solved = transcribe(solved.timed(problem), solved.curve, tightened, stretch=stretch).solve(**options)
+        start = begin if lacking and begin is not None else solved.curve
+        solved = transcribe(solved.timed(problem), start, tightened, stretch=stretch).solve(**options)
         further.append(solved)
     return solved, further
 
