@@ -23,7 +23,7 @@ from pipeline.problem.solution import Status
 from pipeline.search.continuity import components, fewest
 from tests.support import composed
 
-OPTIONS = SegmentsOptions(intervals=40, nodes=90, planner=GlobalOptions(optimised=4, nodes=40))
+OPTIONS = SegmentsOptions(intervals=24, nodes=60, planner=GlobalOptions(optimised=4, nodes=40))
 ROUND = (
     "path=circle",
     "path.angle=720",
@@ -49,7 +49,7 @@ def held() -> Problem:
 
 @pytest.mark.slow
 def test_a_path_round_the_base_is_cut_where_the_first_joint_ends(held: Problem) -> None:
-    found = components(held, 40, 90, np.random.default_rng(1))
+    found = components(held, 28, 60, np.random.default_rng(1))
     cuts = fewest(found)
     assert cuts
     # By so much at most can the other joints turn the tool away from the first link.
@@ -57,9 +57,9 @@ def test_a_path_round_the_base_is_cut_where_the_first_joint_ends(held: Problem) 
     most = 2 * (3.1 + np.abs(ahead).max())
     assert len(cuts) >= np.ceil(4 * np.pi / most) - 1
     for first, last in cuts:
-        assert 0 < first <= last < 40
+        assert 0 < first <= last < 28
         assert found.furthest(last) > last
-    free = components(round_the_base(np.inf), 40, 90, np.random.default_rng(1))
+    free = components(round_the_base(np.inf), 28, 60, np.random.default_rng(1))
     assert fewest(free) == []
 
 

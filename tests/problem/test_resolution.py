@@ -7,7 +7,7 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from pipeline.build.problem import prepare
-from pipeline.problem.resolution import divided, on_path, path_error, resolving, roughly, steps_needed
+from pipeline.problem.resolution import divided, graded, on_path, path_error, resolving, roughly, steps_needed
 from tests.support import composed
 
 TURNS = ("path=circle", "path.radius=0.05", "path.angle=7200", "timing=constant_speed", "timing.duration=1")
@@ -64,14 +64,20 @@ def test_a_coarse_grid_shows_the_shape_of_its_path() -> None:
     assert roughly(prepare(composed(*TURNS, "timing.steps=30")), 25) == 30  # no more than there are
 
 
+def test_no_interval_is_more_than_twice_as_long_as_the_next() -> None:
+    given = np.array([0.0, 0.1, 1.0, 1.05])
+    knots = graded(given)
+    steps = np.diff(knots)
+    assert np.isin(given, knots).all()
+    assert np.maximum(steps[1:] / steps[:-1], steps[:-1] / steps[1:]).max() < 2 + 1e-9
+
+
 def test_knots_lie_where_the_path_curves() -> None:
     words = ("path=waypoints", "path.file=robots/square.csv", "path.corners=blend", "path.blend=0.0005", "robot=panda")
     problem = prepare(composed(*words, "path.units=mm", "path.relative=true", "timing.steps=10", "path.tolerance=1e-5"))
     knots = resolving(problem, 2000)
     assert knots is not None
     assert np.isin(problem.times, knots).all()
-    steps = np.diff(knots)
-    assert np.maximum(steps[1:] / steps[:-1], steps[:-1] / steps[1:]).max() < 2 + 1e-9
     fine = np.linspace(0.0, problem.reference.duration, 20_001)
     spline = CubicSpline(knots, problem.reference.position(knots), bc_type="clamped")
     off = np.linalg.norm(spline(fine) - problem.reference.position(fine), axis=1)

@@ -50,6 +50,7 @@ def test_a_problem_of_cppflow_is_moved_turned_and_surrounded_as_it_says(tmp_path
         cases(problems, tmp_path / "made")
 
 
+@pytest.mark.slow
 def test_a_suite_leaves_a_row_for_each_problem(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     problems = tmp_path / "problems"
     problems.mkdir()

@@ -26,8 +26,8 @@ from pipeline.search.continuity import Components, components, fewest, motions, 
 from pipeline.search.manifold import Manifold
 
 WAYS = 16  # of a piece, from which its optimum is sought
-MOST_TIMES = 8  # so many times the nodes that are asked for, where fewer leave cuts
-STEADY = 2  # doublings after one another that leave no fewer cuts
+MOST_TIMES = 4  # so many times the nodes that are asked for, where fewer leave cuts
+STEADY = 1  # doublings after one another that leave no fewer cuts
 FEWEST = 20  # intervals of a piece, and of a tool path on which it is cut
 
 
@@ -120,12 +120,12 @@ segments = Method(
 def _cut(
     problem: Problem, count: int, options: SegmentsOptions, rng: np.random.Generator
 ) -> tuple[Components, list[tuple[int, int]] | None]:
-    """The cuts of one tool path, with twice as many nodes and again while that leaves fewer of them."""
+    """The cuts of one tool path, at twice as many places with twice as many nodes and again while that leaves fewer."""
     found = components(problem, count, options.nodes, rng)
     cuts = fewest(found)
     nodes, kept = options.nodes, 0
     while cuts != [] and nodes < MOST_TIMES * options.nodes and kept < STEADY:
-        nodes *= 2
+        nodes, count = 2 * nodes, 2 * count
         finer = components(problem, count, nodes, rng)
         again = fewest(finer)
         fewer = again is not None and (cuts is None or len(again) < len(cuts))
