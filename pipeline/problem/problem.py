@@ -36,6 +36,7 @@ class Problem:
     times: (N + 1,) [s] the knots of the grid on which a solution is wanted.
     bounds_of_integrals: upper bounds by the names in the catalogue (`integrals.py`), positive; an infinite one is none.
     qd_init: (n,) [rad/s] the velocity that a motion from q_init comes with; None: at rest, or as the path is entered.
+    qdd_init: (n,) [rad/s^2] the acceleration that it comes with, which counts where jerks are limited; None: none.
     own: the links that may not touch, None: nothing is to be known of them.
     rest: whether all joints rest at the start, at the end. zero_acceleration: whether they do not accelerate there.
     free_law: whether the law of the path is to be found, in the time of the one given; free_duration: whether the
@@ -53,6 +54,7 @@ class Problem:
     obstacles: Obstacles | None = None
     own: Own | None = None
     qd_init: Array | None = None
+    qdd_init: Array | None = None
     rest: tuple[bool, bool] = (False, False)
     zero_acceleration: bool = False
     free_law: bool = False

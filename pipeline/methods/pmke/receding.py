@@ -1,8 +1,9 @@
 """PMKE with limits: a receding horizon whose knots are executed as they are.
 
 Every update interval the motion over the next h knots is optimised from the present position and velocity, within the
-position, velocity, acceleration, torque and power limits and clear of the obstacles; its first knots are executed, so
-that the executed motion keeps the limits at its knots. A window that brings the arm too near to itself is solved again
+position, velocity, acceleration, jerk, torque and power limits and clear of the obstacles; its first knots are
+executed, so that the executed motion keeps the limits at its knots. It begins at rest where the path does, and where
+that is asked for it ends there (`linear.py`). A window that brings the arm too near to itself is solved again
 with the rows that keep it off: few do. A few coarse knots carry the window on to the end of the path: a
 horizon alone runs into dead ends, where the limits leave no way on.
 Windows are solved on their stages (`stages.py`) from the plan before and its multipliers; IPOPT solves them, on the
@@ -55,13 +56,14 @@ def solve(problem: Problem, options: RecedingOptions, context: Context) -> list[
 
 
 def refuses(problem: Problem, options: RecedingOptions) -> str | None:
-    """Of limits between knots and of rest only accelerations are served, as differences, and by the stages alone."""
-    if any(problem.rest) or np.isfinite(problem.bounds.jerk).any():
-        return "the joints are to rest at an end, or their jerks are limited; method=global serves both"
-    if not np.isfinite(problem.bounds.acceleration).any():
+    """Rest is what limits of accelerations or jerks make of it, and these are served by the stages alone."""
+    limited = np.isfinite(problem.bounds.acceleration) | np.isfinite(problem.bounds.jerk)
+    if any(problem.rest) and not np.all(limited):
+        return "the joints are to rest at an end, but not all accelerations are limited; method=global serves that"
+    if not problem.bounds.smooth:
         return None
     why = _stages_why_not(problem, options)
-    return why and f"limits of acceleration together with {why}; method=global serves both"
+    return why and f"limits of acceleration or jerk together with {why}; method=global serves both"
 
 
 receding = Method("receding", "PMKE with limits", "#5B7FDB", RecedingOptions, ANY, solve, refuses)
@@ -88,8 +90,8 @@ def _follow(problem: Problem, options: RecedingOptions) -> Solution:
     planned = 0  # the last knot that there is a plan for
     for i in range(0, count, every):
         last = min(i + max(options.horizon, every), count)
-        qd = None if i == 0 else (q[i] - q[i - 1]) / (times[i] - times[i - 1])
-        window = replace(updates.problem, q_init=q[i], qd_init=qd, times=_knots(times, i, last, options.tail))
+        window = continued(updates.problem, times, q[: i + 1])
+        window = replace(window, times=_knots(times, i, last, options.tail))
         found = updates(window, plan, alone=planned < min(i + every, count))
         if found is not None:
             plan, planned = _through(window.times, found), last
@@ -123,14 +125,27 @@ def _first_plan(problem: Problem, objective: Objective) -> tuple[Callable[[Array
     """The whole motion on a coarse grid, as the global planner finds it; or None, and why there is none."""
     times = np.linspace(0.0, problem.reference.duration, PLAN_INTERVALS + 1)
     whole = replace(problem, times=times, objective=objective, boundary=Boundary.FIXED)
-    # By differences as the windows are, unless accelerations are limited, of which those programs know nothing.
+    # By differences as the windows are, unless accelerations or jerks are limited, of which those know nothing.
     form: Literal["differences"] | None = None if problem.bounds.smooth else "differences"
     for starts in FIRST_STARTS:
         options = GlobalOptions(transcription=form, optimised=starts, budget=starts, refine_to=None)
         first = global_planner(whole, options)[0]
         if first.found:
-            return _through(times, first.trajectory.q), ""
+            return _through(first.trajectory.time, first.trajectory.q), ""
     return None, first.message
+
+
+def continued(problem: Problem, times: Array, done: Array) -> Problem:
+    """The problem from where done (i + 1, n), executed at the first of times, ends: with its velocity and acceleration
+    by backward differences, as `linear.py` goes on from them.
+    """
+    if len(done) == 1:
+        return problem
+    dt = np.diff(times[: len(done)])[:, None]
+    step = np.diff(done, axis=0) / dt
+    first = np.zeros_like(step[:1]) if problem.reference.timing.at_rest else step[:1]
+    change = np.diff(np.vstack([first, step]), axis=0) / dt
+    return replace(problem, q_init=done[-1], qd_init=step[-1], qdd_init=change[-1])
 
 
 def _knots(times: Array, first: int, last: int, tail: int) -> Array:
@@ -150,8 +165,8 @@ class _Updates:
         self.problem, self.options = problem, options
         self.stages = None if _stages_why_not(problem, options) else Stages(without_own(problem))
         self.own = Clearance(problem.task.arm, None, problem.own) if keeps_own(problem) else None
-        # Its program knows no accelerations: it would find another motion.
-        self.ipopt = not np.isfinite(problem.bounds.acceleration).any()
+        # Its program knows neither accelerations nor jerks: it would find another motion.
+        self.ipopt = not problem.bounds.smooth
         self.before: Answer | None = None  # of the last window, where it was solved
         self.solved: list[tuple[int, Problem, Answer]] = []
         self.log: list[dict[str, Any]] = []

@@ -1,10 +1,10 @@
 """A window with limits and obstacles, on its stages: quadratic programs with the exact Hessian of the energy.
 
 Each linearisation serves all knots with one call of the kernels: cost and path (`model/kernel/few.py`), torques and
-powers (`program/newton/forces.py`), clearance (`program/newton/clear.py`). The step onto the path is fixed per knot
-(J' = Y R), what is left of the unknowns, h r of them, is found by a primal-dual interior point for quadratic programs
-(`quadratic.py`) from the multipliers of the window before. Curvature of torques and distances is left out: rows that
-are not active have none.
+powers (`program/newton/forces.py`), clearance (`program/newton/clear.py`); what is linear is made once (`linear.py`).
+The step onto the path is fixed per knot (J' = Y R), what is left of the unknowns, h r of them, is found by a
+primal-dual interior point for quadratic programs (`quadratic.py`) from the multipliers of the window before. Curvature
+of torques and distances is left out: rows that are not active have none.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.common.arrays import Array
+from pipeline.methods.pmke.linear import linear_rows
 from pipeline.methods.pmke.quadratic import Quadratic, minimise
 from pipeline.model.clearance import Clearance
 from pipeline.model.kernel.chain import Chain
@@ -79,7 +80,7 @@ class Stages:
         self.kernels: dict[int, tuple[Few, FewRows]] = {}
 
     def solve(self, window: Problem, guess: Array, before: Answer | None, most: int | None = None) -> Answer:
-        """The motion on window.times (U + 1,) from window.q_init and qd_init.
+        """The motion on window.times (U + 1,) from window.q_init, qd_init and qdd_init.
 
         Started at the guess (U + 1, n) and the multipliers of the window `before`. most: exactly so many programs;
         None: until it has converged.
@@ -135,7 +136,7 @@ class _Window:
             self.terms.append(Forces(stages.chain, window, self.knots))
         if stages.clearance is not None:
             self.terms.append(Clear(stages.clearance))
-        self.linear = _linear(window, self.knots, self.n)
+        self.linear = linear_rows(window)
         self.count = self.linear[1].shape[1] + sum(term.count for term in self.terms)
 
     def rows(self, x: Array) -> Array:
@@ -254,44 +255,6 @@ class _Window:
             for s in range(reach)
         ]
         return np.concatenate(values, axis=1), tuple(whole)
-
-
-def _linear(window: Problem, knots: Knots, n: int) -> tuple[Array, ...]:
-    """Of positions, velocities and accelerations: c (U, R) at x = 0, and its derivatives (U, R, n) by x_k, x_(k-1),
-    x_(k-2). Positions relative to their range, the others to their bounds; only those that are finite.
-    """
-    bounds, U, dt = window.bounds, knots.count, knots.dt[:, None]
-    unit, zero = np.tile(np.eye(n), (U, 1, 1)), np.zeros((U, n, n))
-    start = window.q_init
-    both = np.isfinite(bounds.upper - bounds.lower)
-    width = np.where(both, np.where(both, bounds.upper, 1.0) - np.where(both, bounds.lower, 0.0), 1.0)
-    parts: list[tuple[Array, Array, Array, Array]] = []
-
-    def add(offset: Array, by: tuple[Array, Array, Array], bound: Array, value: Array, sign: float) -> None:
-        """sign (bound - quantity) / value >= 0 of the joints whose bound is finite; quantity = offset + by x."""
-        kept = np.flatnonzero(np.isfinite(bound))
-        if kept.size:
-            own = [-sign * (g / value[:, None])[:, kept] for g in by]
-            parts.append((sign * ((bound - offset) / value)[:, kept], own[0], own[1], own[2]))
-
-    velocity = np.zeros((U, n))
-    velocity[0] = -start / dt[0]
-    by_qd = (unit / dt[:, :, None], -unit / dt[:, :, None], zero)
-    add(np.zeros((U, n)), (unit, zero, zero), bounds.upper, width, 1.0)
-    add(np.zeros((U, n)), (unit, zero, zero), bounds.lower, width, -1.0)
-    for sign in (1.0, -1.0):
-        add(velocity, by_qd, sign * bounds.velocity, bounds.velocity, sign)
-    acceleration = np.broadcast_to(bounds.acceleration, n)
-    if np.isfinite(acceleration).any():
-        came_with = np.zeros(n) if window.qd_init is None else window.qd_init
-        earlier = np.vstack([came_with, velocity[:-1]])
-        ahead = [np.concatenate([zero[:1], g[:-1]]) for g in by_qd[:2]]
-        by_qdd = tuple((g - e) / dt[:, :, None] for g, e in zip(by_qd, (zero, ahead[0], ahead[1]), strict=True))
-        for sign in (1.0, -1.0):
-            add((velocity - earlier) / dt, by_qdd, sign * acceleration, acceleration, sign)
-    if not parts:
-        return np.zeros((U, 0)), *(np.zeros((U, 0, n)) for _ in range(3))
-    return tuple(np.concatenate(column, axis=1) for column in zip(*parts, strict=True))
 
 
 def _diagonal(blocks: Array) -> Array:

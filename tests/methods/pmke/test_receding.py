@@ -101,8 +101,31 @@ def test_torques_at_their_limit_and_windows_cut_off() -> None:
     assert all(entry["iterations"] == 3 for entry in done.statistics["predictions"] if entry["status"] == "newton")
 
 
+@pytest.mark.slow
+def test_jerks_are_limited_from_rest_to_rest() -> None:
+    """Standing before the start and after the end too: differences of the executed knots alone say so."""
+    ends = ("boundary.rest=[start,end]", "limits.acceleration=1")
+    free = trajectory3(*ends)
+    asked = trajectory3(*ends, "boundary.zero_acceleration=true", "limits.jerk=2")
+    most, energy = [], []
+    for problem in (free, asked):
+        done = receding(problem, WINDOW)[0]
+        judged = evaluate(problem, done)
+        assert judged.status is Status.SOLVED, judged.message
+        assert {entry["status"] for entry in done.statistics["predictions"]} == {"newton"}
+        q = done.trajectory.q
+        standing = np.vstack([q[:1], q[:1], q[:1], q, q[-1:], q[-1:], q[-1:]])
+        most.append([float(np.abs(np.diff(standing, order, axis=0) / 0.2**order).max()) for order in (2, 3)])
+        energy.append(judged.objective)
+    assert most[0][0] <= 1 + 1e-6
+    assert most[0][1] > 4, "the limit would not be felt: the test shows nothing"
+    assert most[1][1] == pytest.approx(2, rel=1e-6)
+    assert judged.limit_excess["jerk"] == pytest.approx(0, abs=1e-6)
+    assert energy[0] < energy[1] < 1.01 * energy[0]
+
+
 def test_what_receding_does_not_serve_is_said() -> None:
-    with pytest.raises(InputError, match="receding: limits of acceleration together with terms beside the kinetic"):
+    with pytest.raises(InputError, match="receding: limits of acceleration or jerk together with terms beside the kin"):
         receding(trajectory3("limits.acceleration=1", "objective=torque"))
-    with pytest.raises(InputError, match="receding: the joints are to rest at an end"):
+    with pytest.raises(InputError, match="receding: the joints are to rest at an end, but not all accelerations"):
         receding(replace(trajectory3(), rest=(True, False)))

@@ -93,7 +93,9 @@ def test_derivatives_equal_central_differences(problem: Problem, guess: Array, r
 
     bound = replace(
         problem,
-        limits=replace(problem.bounds, acceleration=np.full(7, 3.0), power=np.full(7, 20.0)),
+        limits=replace(problem.bounds, acceleration=np.full(7, 3.0), jerk=np.full(7, 40.0), power=np.full(7, 20.0)),
+        qdd_init=np.linspace(-1.0, 1.0, 7),
+        rest=(False, True),
         task=replace(problem.task, arm=with_shapes("panda")),  # whose distance from the ball bends nowhere
         own=None,
     )
