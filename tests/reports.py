@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
+from rerun.chunk import RrdReader
 
 from pipeline.artifacts.report import Report
 from pipeline.config.run import RunConfig
@@ -63,3 +65,13 @@ def three_motions() -> Report:
         Solution("global", Trajectory(TIMES, MOVES[:, [0, 2, 1]]), Status.SOLVED, optimum=2),
     ]
     return report_of(problem, [evaluate(problem, one) for one in own], settings=RunConfig(name="mine"))
+
+
+def chunks(file: Path, content: str) -> list[object]:
+    return RrdReader(file).stream().filter(content=content).to_chunks()
+
+
+def component(file: Path, entity: str, name: str) -> object:
+    """The last value of one component on an entity."""
+    batches = [chunk.to_record_batch() for chunk in chunks(file, entity)]
+    return [batch[name].to_pylist()[-1] for batch in batches if name in batch.schema.names][-1]
