@@ -17,7 +17,7 @@ from scipy.spatial import ConvexHull
 from pipeline.artifacts.figures import figures as files
 from pipeline.artifacts.figures import motions as figures
 from pipeline.artifacts.figures import solids
-from pipeline.artifacts.figures.panels import thin
+from pipeline.artifacts.figures.panels import by_joint, thin
 from pipeline.artifacts.figures.stroboscopic import stroboscopic
 from pipeline.common.arrays import Array
 from pipeline.evaluation.evaluation import Evaluation, evaluate
@@ -297,6 +297,16 @@ def test_limits_are_drawn_with_an_entry_and_told_where_they_are_far() -> None:
     assert any("limits from 9 on, outside" in text.get_text() for text in velocity.texts)
     named = [text.get_text() for text in figure.legends[0].texts]
     assert named == [*report.motions.problem.task.arm.description.actuated, "Limits"]
+
+
+@pytest.mark.parametrize("name", ["q", "panda_joint", "left_shoulder_lift_joint"])
+def test_names_of_joints_are_whole(case: Case, name: str) -> None:
+    """However long they are."""
+    shown = by_joint("run", [f"{name}{k}" for k in range(3)], case[1][:1], ("q", "rad", lambda e: e.q, None))
+    shown.draw_without_rendering()
+    inside = shown.legends[0].get_window_extent()
+    assert inside.x0 >= 0
+    assert inside.x1 <= shown.bbox.x1
 
 
 def test_the_clearance_stands_beside_its_margin() -> None:

@@ -23,6 +23,7 @@ from pipeline.studies import style
 POINTS = 1001  # most points per line: more than a screen shows
 COLUMNS = 5  # most panels side by side
 FAR = 2.5  # times the largest value: limits beyond are told and not drawn
+LETTERS, LINE = 13, 9  # of a legend: in an inch, and as wide as the line before a name
 LIMITED, BROKEN = "limited", (0, (2, 3))
 INK, PALE, EVENT, PATH = "#1A202C", "#D5D9DF", "#C53030", "#B83280"
 
@@ -72,7 +73,9 @@ def by_joint(
     handles, labels = figure.axes[0].get_legend_handles_labels()
     if any(axes.get_gid() == LIMITED for axes in figure.axes):
         handles, labels = [*handles, Line2D([], [], color=INK, linestyle=BROKEN, linewidth=1.0)], [*labels, "Limits"]
-    figure.legend(handles, labels, loc="outside lower center", ncols=min(len(labels), 4 * columns), frameon=False)
+    letters = max(len(label) for label in labels) + LINE
+    across = max(1, int(LETTERS * figure.get_figwidth() / letters))
+    figure.legend(handles, labels, loc="outside lower center", ncols=min(len(labels), across), frameon=False)
     return figure
 
 
