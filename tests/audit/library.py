@@ -97,9 +97,14 @@ class Robot:
 
     def clearance(self, q: Values) -> float:
         """The least distance [m] of a moving link from an obstacle, over the motion q (N + 1, n)."""
-        file = str(locate(self.config["robot"]["urdf"], "robot.urdf"))
+        file = locate(self.config["robot"]["urdf"], "robot.urdf")
         solids = [solid(values) for values in self.config["obstacles"]["shapes"].values()]
-        links = pin.buildGeomFromUrdf(self.model, file, pin.GeometryType.COLLISION)
+        shares = [str(up) for up in file.parents]
+        links = pin.buildGeomFromUrdf(self.model, str(file), pin.GeometryType.COLLISION, package_dirs=shares)
+        for link in links.geometryObjects:
+            if isinstance(link.geometry, coal.BVHModelBase):  # a mesh stands for its hull
+                link.geometry.buildConvexHull(True, "Qt")
+                link.geometry = link.geometry.convex
         placed, least = links.createData(), np.inf
         for one in q:
             pin.updateGeometryPlacements(self.model, self.data, links, placed, one)

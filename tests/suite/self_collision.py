@@ -36,7 +36,7 @@ def model() -> tuple[Any, Any]:
     file, srdf = locate(f"{FOLDER}/urdf/panda.urdf", "urdf"), locate(f"{FOLDER}/srdf/panda.srdf", "srdf")
     whole = pin.buildModelFromUrdf(str(file))
     shares = [str(file.parents[4]), str(file.parents[3].parent)]
-    solids = pin.buildGeomFromUrdf(whole, str(file), pin.GeometryType.COLLISION, shares)
+    solids = pin.buildGeomFromUrdf(whole, str(file), pin.GeometryType.COLLISION, package_dirs=shares)
     for solid in solids.geometryObjects:
         if isinstance(solid.geometry, coal.BVHModelBase):
             solid.geometry.buildConvexHull(True, "Qt")
