@@ -100,11 +100,12 @@ class Plan:
     """One problem, its starts, and both sides' way from them to all optima."""
 
     def __init__(self, name: str, *words: str) -> None:
-        config = composed(f"+experiment={name}", *(ROADMAP if name.startswith("traj") else ()), *words)
+        usual = (f"+experiment={name}", *(ROADMAP if name.startswith("traj") else ()))
+        config = composed(*usual, "collision.self=false", *words)  # the peer knows no distances
         self.problem, self.options = prepare(config), config.method.of("global")
         self.alone = Batch.without(self.problem, replace(self.options, solver="newton"))
-        usual = planner.STEPS_ALONE if self.alone else planner.STEPS
-        self.grids = refinement(self.problem.times, self.options.coarse_steps or usual)
+        coarse = planner.STEPS_ALONE if self.alone else planner.STEPS
+        self.grids = refinement(self.problem.times, self.options.coarse_steps or coarse)
         begin = time.process_time()
         self.motions = Starts(self.problem, self.grids[0], self.options, np.random.default_rng(config.seed)).first
         self.drawn = time.process_time() - begin
