@@ -100,3 +100,5 @@ def test_an_optimum_that_was_lost_says_what_it_could_not_meet() -> None:
     assert said.startswith("2 optima of the coarse grid were lost on a finer one (")
     assert "iteration limit on 50 intervals: its constraints hold to 2e-03, its optimality to 4e-01" in said
     assert "; lost)" in said
+    said = no_optimum(problem, problem.times, [Optimum(q, 1.0, True, "success")], refined[:1])
+    assert said.startswith("1 optimum of the coarse grid was lost on a finer one (")

@@ -21,9 +21,13 @@ REACHED = 1e-6  # [m, rad]
 
 def counted(optima: int, starts: int, barren: int, left: int = 0) -> str:
     """How many optima came of how many starts; `left` dearer ones were not carried to the long path's knots."""
-    count = f"{optima} distinct optim{'um' if optima == 1 else 'a'} found from {starts} starts"
+    count = f"{optima} distinct {_named(optima)} found from {starts} starts"
     dearer = f"{left} dearer one{'s' if left > 1 else ''} of the coarse grid not refined; " if left else ""
     return f"{count}; the last {barren} starts brought nothing new; {dearer}"
+
+
+def _named(count: int) -> str:
+    return "optimum" if count == 1 else "optima"
 
 
 def no_start(problem: Problem, drawn: int) -> str:
@@ -59,7 +63,8 @@ def no_optimum(problem: Problem, grid: Array, starts: list[Optimum], refined: li
         fates |= {"jumps between branches"} if jumping else set()
         lost = len(refined) + jumping
         return (
-            f"{lost} optima of the coarse grid were lost on a finer one ({'; '.join(sorted(fates))}); "
+            f"{lost} {_named(lost)} of the coarse grid {'was' if lost == 1 else 'were'} lost on a finer one "
+            f"({'; '.join(sorted(fates))}); "
             "try more knots (timing.steps, method.global.coarse_steps)"
         )
     words = Counter(start.status for start in starts).most_common(1)[0][0]
