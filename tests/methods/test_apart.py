@@ -1,0 +1,39 @@
+"""The arm and itself in the planner: what comes too near is solved again, and what does not stays as it is."""
+
+from __future__ import annotations
+
+import pytest
+
+from pipeline.build.problem import prepare
+from pipeline.evaluation.evaluation import Evaluation, evaluate
+from pipeline.methods.global_planner.planner import global_planner
+from pipeline.problem.solution import Status
+from tests.support import FEW_STARTS, composed
+
+MARGIN = 0.25  # [m] of the last joint from the first: the best motion keeps it by 11 mm, the second falls 1.4 mm short
+BALL = "[{kind: sphere, radius: 0.02, center: %s}]"
+SHAPES = f"{{base: {BALL % '[0, 0, 0]'}, link2: {BALL % '[0.16, 0, 0]'}}}"
+
+
+def optima(kept: str) -> list[Evaluation]:
+    """The first two."""
+    words = (f"robot.collision={SHAPES}", f"collision.margin={MARGIN}", f"collision.self={kept}", *FEW_STARTS)
+    config = composed("+experiment=traj3", "timing.steps=20", *words)
+    problem = prepare(config)
+    return [evaluate(problem, one) for one in global_planner(problem, config.method.of("global"))[:2]]
+
+
+def least(one: Evaluation) -> float:
+    """[m]"""
+    assert one.near.own is not None
+    return float(one.near.own.bound)
+
+
+@pytest.mark.slow
+def test_an_optimum_too_near_to_the_arm_is_moved_and_others_stay() -> None:
+    (best, second), (best_without, second_without) = optima("true"), optima("false")
+    assert least(second_without) < MARGIN < least(best_without)
+    assert best.energy_integral[-1] == pytest.approx(best_without.energy_integral[-1], rel=1e-9)
+    assert second.status is Status.SOLVED
+    assert MARGIN <= least(second) < MARGIN + 2e-3
+    assert 1 < second.energy_integral[-1] / second_without.energy_integral[-1] < 1.1
