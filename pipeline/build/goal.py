@@ -17,6 +17,7 @@ from pipeline.model.obstacles import Obstacles
 from pipeline.problem.limits import Limits
 from pipeline.problem.objective import Objective
 from pipeline.problem.secondary import Secondary
+from pipeline.robot import world
 from pipeline.robot.joint_limits import read
 from pipeline.robot.limits import UNLIMITED
 from pipeline.robot.packages import find
@@ -90,6 +91,8 @@ def make_obstacles(obstacles: ObstaclesConfig, arm: Arm) -> Obstacles | None:
     if not arm.description.collision:
         raise ConfigError(f"obstacles: {arm.description.name} has no collision shapes; give them in robot.collision")
     shapes = [make_shape(name, shape) for name, shape in obstacles.shapes.items()]
+    if obstacles.file is not None:
+        shapes += world.read(find(obstacles.file, "obstacles.file"))
     if obstacles.floor is not None:
         x, y, _ = arm.mounting.base_position
         shapes.append(Shape("floor", "half_space", SLAB, (x, y, obstacles.floor)))

@@ -189,6 +189,10 @@ class ObstaclesConfig:
         dict[str, Shape],
         Field(description="{name: {kind: sphere, box, capsule, cylinder or mesh, ...}, ...} in the world"),
     ] = field(default_factory=dict)
+    file: Annotated[
+        Text | None,
+        Field(description="SDF (a world too) or URDF of what stands still, in the world; null: none"),
+    ] = None
     floor: Annotated[
         Position | None, Field(description="[m] height of a floor: all below it is solid; null: there is none")
     ] = None
@@ -196,7 +200,7 @@ class ObstaclesConfig:
     @property
     def any(self) -> bool:
         """Whether there is something to be clear of."""
-        return bool(self.shapes) or self.floor is not None
+        return bool(self.shapes) or self.file is not None or self.floor is not None
 
 
 @schema

@@ -57,7 +57,7 @@ class Shape:
         try:
             return np.asarray(meshes.hull(self.file) * np.array(self.size))
         except RobotError as error:
-            whose = f"obstacles.shapes.{self.name}" if self.frame is None else f"link '{self.frame}'"
+            whose = f"obstacle {self.name}" if self.frame is None else f"link '{self.frame}'"
             raise RobotError(f"{whose}: {error}") from None
 
     def moved(self, rotation: Array, position: Array) -> Shape:
