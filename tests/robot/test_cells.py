@@ -7,7 +7,8 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import coal
 import numpy as np
@@ -15,6 +16,7 @@ import pinocchio as pin
 import pytest
 from scipy.spatial.transform import Rotation
 
+from pipeline.artifacts import scene
 from pipeline.artifacts.recording.picture import picture
 from pipeline.build.collision import make_own
 from pipeline.build.problem import prepare
@@ -24,6 +26,7 @@ from pipeline.config.robot import CollisionConfig
 from pipeline.evaluation.clearance import Clearance
 from pipeline.evaluation.plant import SinglePlant
 from pipeline.model.arm import Arm
+from pipeline.problem.problem import Problem
 from pipeline.robot import urdf
 from pipeline.robot.packages import find
 from tests.support import composed
@@ -206,3 +209,21 @@ def test_a_gripper_stands_at_its_width(width: float) -> None:
         clearance = Clearance(arm, None, replace(own, pairs=(pair,)))
         ours = clearance.smallest(clearance.own, q[None])[0]
         assert ours == pytest.approx(least(model, solids, q, [pair]), abs=1e-6)
+
+
+def test_other_limbs_are_drawn_where_they_are_held() -> None:
+    """And the arm itself is not, nor fingers, nor what nobody could read."""
+    arm = Arm(urdf.read(find(BAXTER), "left_gripper", locked=DOWN))
+    own = make_own(CollisionConfig(), arm)
+    assert own is not None
+    drawn = scene.limbs(cast(Problem, SimpleNamespace(task=SimpleNamespace(arm=arm), own=own)))
+    model, solids = in_coal(BAXTER, arm.description.joints, tuple(DOWN.items()))
+    data, at = model.createData(), solids.createData()
+    pin.updateGeometryPlacements(model, data, solids, at, np.zeros(7))
+    there = {one.name: at.oMg[i].translation for i, one in enumerate(solids.geometryObjects)}
+    assert any("right_wrist" in shape.name for shape in drawn)
+    assert not any(shape.name.startswith("left") for shape in drawn)
+    for shape in drawn:
+        np.testing.assert_allclose(shape.position, there[shape.name], atol=1e-9)
+    unknown = replace(own, unknown="a mesh is missing")
+    assert scene.limbs(cast(Problem, SimpleNamespace(task=SimpleNamespace(arm=arm), own=unknown))) == ()
