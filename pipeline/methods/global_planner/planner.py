@@ -21,7 +21,7 @@ from pipeline.methods.global_planner.batch import JUMPS, Batch
 from pipeline.methods.global_planner.grids import coarsest, finer, on_knots, refinement, served
 from pipeline.methods.global_planner.optimum import Optimum, go_on, optimise_start, refine
 from pipeline.methods.global_planner.ranking import in_order
-from pipeline.methods.global_planner.reasons import counted, no_feasible, no_optimum, no_start
+from pipeline.methods.global_planner.reasons import counted, no_feasible, no_optimum, no_place, no_start
 from pipeline.methods.global_planner.smooth import freer, nothing, rough, smooth, splined, unserved
 from pipeline.methods.global_planner.starts import Known, Starts
 from pipeline.methods.global_planner.timed import timed
@@ -85,6 +85,8 @@ def by_differences(
         problem = without_own(problem)
     if not len(motions):
         return [nothing(problem, Status.INFEASIBLE, no_start(problem, log.get("drawn", 0)), log)]
+    if not log.get("roadmap_paths", 1) and (barred := no_place(problem, grids[0])):
+        return [nothing(problem, Status.INFEASIBLE, barred, log)]
 
     batch = Batch(problem, options) if why is None else None
     context.phase(f"solving them on {len(grids[0]) - 1} intervals")
@@ -93,6 +95,8 @@ def by_differences(
         starts = _optimise_starts(problem, grids[0], options, motions, batch, context)
         if any(start.converged for start in starts):
             break
+        if grids[0] is drawn.grid and (barred := no_place(problem, grids[0])):
+            return [nothing(problem, Status.INFEASIBLE, barred, log)]
         relaxed = _relaxed(problem, grids[0], motions)
         if relaxed is not None and relaxed.feasible:
             starts += context.workers.map(optimise_start, (problem, grids[0], options), [relaxed.q])

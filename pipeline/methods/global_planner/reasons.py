@@ -13,10 +13,13 @@ from pipeline.methods.global_planner.optimum import Optimum
 from pipeline.model.kinematics import ATTEMPTS, reach
 from pipeline.problem.problem import Problem
 from pipeline.program.feasibility import Relaxed, violations
+from pipeline.search.barred import barred
 
 OTHERS = "more starts (method.global.optimised) or other ones (method.global.starts)"
 
 REACHED = 1e-6  # [m, rad]
+
+NODES = 1000  # of the longest self-motion manifold
 
 
 def counted(optima: int, starts: int, barren: int, left: int = 0) -> str:
@@ -48,6 +51,18 @@ def no_start(problem: Problem, drawn: int) -> str:
         f"none of {drawn} motions that were drawn follows the path to its end; try other ones (method.global.starts), "
         "more of them (method.global.candidates), or another robot.q_init: from a singular one many get stuck"
     )
+
+
+def no_place(problem: Problem, times: Array) -> str:
+    """That at some place of the path no configuration is within the position limits, where r = 1 lets that be seen at
+    the knots `times`; else nothing.
+    """
+    bounds = problem.bounds
+    limited = bool(np.isfinite(bounds.lower).any() or np.isfinite(bounds.upper).any())
+    if problem.task.redundancy != 1 or problem.task.arm.base.count or not limited:
+        return ""
+    found = barred(problem, times, NODES)
+    return "" if found is None else found.sentence
 
 
 def no_feasible(starts: int, relaxed: Relaxed) -> str:
