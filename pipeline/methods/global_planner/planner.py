@@ -84,9 +84,8 @@ def by_differences(
     if lazy:
         problem = without_own(problem)
     if not len(motions):
-        return [nothing(problem, Status.INFEASIBLE, no_start(problem, log.get("drawn", 0)), log)]
-    if not log.get("roadmap_paths", 1) and (barred := no_place(problem, grids[0])):
-        return [nothing(problem, Status.INFEASIBLE, barred, log)]
+        why_none = log.get("barred") or no_start(problem, log.get("drawn", 0))
+        return [nothing(problem, Status.INFEASIBLE, why_none, log)]
 
     batch = Batch(problem, options) if why is None else None
     context.phase(f"solving them on {len(grids[0]) - 1} intervals")
