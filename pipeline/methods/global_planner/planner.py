@@ -63,26 +63,36 @@ def solve(problem: Problem, options: GlobalOptions, context: Context, known: Kno
 
 
 def by_differences(
-    problem: Problem, options: GlobalOptions, context: Context, known: Known | None = None, lazy: bool = True
+    problem: Problem, options: GlobalOptions, context: Context, known: Known | None = None
 ) -> list[Solution]:
     """The same on the knots alone, as the papers have it.
 
-    lazy: of the arm itself only the starts keep clear; of the optima those that come too near to it are solved again,
-    and where none of them is left, all is.
+    Of the arm itself only the starts keep clear; of the optima those that come too near to it are solved again. Where
+    none of them is left, all is.
     """
-    given, lazy = problem, lazy and keeps_own(problem)
-    why = Batch.without(without_own(problem) if lazy else problem, options)
+    if keeps_own(problem):
+        found = _searched(problem, without_own(problem), options, context, known)
+        if found is not None:
+            return found
+    return _searched(problem, problem, options, context, known) or []
+
+
+def _searched(
+    given: Problem, problem: Problem, options: GlobalOptions, context: Context, known: Known | None
+) -> list[Solution] | None:
+    """The optima of `problem` from starts of the given one, then solved as that; None where this loses all of them."""
+    afterwards = given is not problem
+    why = Batch.without(problem, options)
     times, too_coarse = on_knots(problem, options.refine_to)
     if too_coarse:
         return [nothing(problem, Status.NOT_CONVERGED, too_coarse, {})]
-    asked, problem = len(problem.times) - 1, replace(problem, times=times)
+    asked = len(problem.times) - 1
+    given, problem = replace(given, times=times), replace(problem, times=times)
     shape = coarsest(problem, options.coarse_steps, STEPS if why is None else STEPS_ALONE)
     grids = refinement(times, shape, shape if options.coarse_steps is None else 2)
     context.phase("drawing starts")
-    drawn = Starts(problem, grids[0], options, np.random.default_rng(context.seed), known)
+    drawn = Starts(given, grids[0], options, np.random.default_rng(context.seed), known)
     motions, log = drawn.first, drawn.log
-    if lazy:
-        problem = without_own(problem)
     if not len(motions):
         return [nothing(problem, Status.INFEASIBLE, no_start(problem, log.get("drawn", 0)), log)]
 
@@ -126,12 +136,12 @@ def by_differences(
         best = min((fine.cost for fine, _ in found), default=np.inf)
         sent = [pair for pair in found if pair[0].cost == best or finer(problem, MOST, [pair[0].q]) is None]
         log["optima_off_path"], found = len(found) - len(sent), sent
-    clear = apart(replace(given, times=problem.times), [fine for fine, _ in found], options, context) if lazy else []
-    if lazy and found:
+    if afterwards and found:
+        problem = replace(given, times=problem.times)
+        clear = apart(problem, [fine for fine, _ in found], options, context)
         found = [(fine, members) for fine, (_, members) in zip(clear, found, strict=True) if _good(fine)]
         if not found:
-            return by_differences(given, options, context, known, lazy=False)
-        problem = replace(given, times=problem.times)
+            return None
     log["jumping_optima"] = coarse.jumping + sum(fine.converged and not fine.continuous for fine in refined)
     if not found:
         why_not = no_optimum(problem, grids[0], starts, refined, coarse.jumping)
@@ -172,28 +182,36 @@ def as_solution(problem: Problem, optimum: Optimum, options: GlobalOptions) -> S
 
 
 def finish(
-    problem: Problem, times: Array, motions: Array, options: GlobalOptions, context: Context, lazy: bool = True
+    problem: Problem, times: Array, motions: Array, options: GlobalOptions, context: Context
 ) -> tuple[Array, list[Optimum]]:
     """The distinct optima, best first, to which motions (S, N + 1, n) on the knots `times` lead, and the knots that
-    they are on: the problem's, or those that its path needs. Motions that are lost on the way are left out. lazy: see
-    `by_differences`.
+    they are on: the problem's, or those that its path needs. Motions that are lost on the way are left out. Of the arm
+    itself they are kept clear as `by_differences` does.
     """
+    if not keeps_own(problem):
+        return _finished(problem, times, motions, options, context)
+    knots, good = _finished(without_own(problem), times, motions, options, context)
+    if good:
+        given = replace(problem, times=knots)
+        good = [optimum for optimum in apart(given, good, options, context) if _good(optimum)]
+        if not good:
+            return _finished(problem, times, motions, options, context)
+    return knots, basins(problem, knots, good, options.same_path).optima
+
+
+def _finished(
+    problem: Problem, times: Array, motions: Array, options: GlobalOptions, context: Context
+) -> tuple[Array, list[Optimum]]:
     knots, too_coarse = on_knots(problem, options.refine_to)
     if too_coarse:
         return knots, []
-    given, lazy = problem, lazy and keeps_own(problem)
-    problem = replace(without_own(problem) if lazy else problem, times=knots)
+    problem = replace(problem, times=knots)
     batch = Batch(problem, options) if Batch.without(problem, options) is None else None
     grids = [times, *(grid for grid in refinement(knots, len(times)) if len(grid) > len(times))]
     starts = _optimise_starts(problem, times, options, motions, batch, context)
     chosen = basins(problem, times, starts, options.same_path).optima
     problem, _, refined = _to_the_end(problem, grids, options, chosen, batch, context)
     good = [optimum for optimum in refined if _good(optimum)]
-    if lazy and good:
-        problem = replace(given, times=problem.times)
-        good = [optimum for optimum in apart(problem, good, options, context) if _good(optimum)]
-        if not good:
-            return finish(given, times, motions, options, context, lazy=False)
     return problem.times, basins(problem, problem.times, good, options.same_path).optima
 
 
