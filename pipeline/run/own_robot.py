@@ -15,7 +15,7 @@ from pipeline.common.errors import InputError
 from pipeline.common.files import shipped
 
 # What else belongs to one arm alone; where nobody says it, what conf/robot/_common.yaml does.
-BELONGS = ("limits", "srdf", "collision", "locked", "armature", "offset", "offset_rpy", "base")
+BELONGS = ("limits", "srdf", "collision", "tool", "locked", "armature", "offset", "offset_rpy", "base")
 
 
 def words(asked: Sequence[str]) -> tuple[list[str], str]:
