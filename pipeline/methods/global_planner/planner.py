@@ -22,10 +22,10 @@ from pipeline.methods.global_planner.grids import coarsest, finer, on_knots, ref
 from pipeline.methods.global_planner.optimum import Optimum, go_on, optimise_start, refine
 from pipeline.methods.global_planner.ranking import in_order
 from pipeline.methods.global_planner.reasons import counted, no_feasible, no_optimum, no_start
-from pipeline.methods.global_planner.smooth import freer, nothing, rough, smooth, splined, unserved
+from pipeline.methods.global_planner.smooth import exactly, freer, nothing, rough, smooth, splined, unserved
 from pipeline.methods.global_planner.starts import Known, Starts
 from pipeline.methods.global_planner.timed import timed
-from pipeline.methods.global_planner.tube import exactly, loosened
+from pipeline.methods.global_planner.tube import loosened
 from pipeline.methods.method import ALONG_LOOPS, WITH_TIMING, Context, Method
 from pipeline.model.kinematics import wrap
 from pipeline.problem.limits import LIMIT_KINDS
