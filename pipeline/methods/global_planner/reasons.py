@@ -9,9 +9,12 @@ from collections import Counter
 import numpy as np
 
 from pipeline.common.arrays import Array
+from pipeline.config.methods import GlobalOptions
+from pipeline.methods.global_planner.grids import finer
 from pipeline.methods.global_planner.optimum import Optimum
 from pipeline.model.kinematics import ATTEMPTS, reach
 from pipeline.problem.problem import Problem
+from pipeline.problem.resolution import MOST
 from pipeline.program.feasibility import Relaxed, violations
 from pipeline.search.barred import barred
 
@@ -31,6 +34,14 @@ def counted(optima: int, starts: int, barren: int, left: int = 0) -> str:
 
 def _named(count: int) -> str:
     return "optimum" if count == 1 else "optima"
+
+
+def on_how_many(problem: Problem, asked: int, options: GlobalOptions, motions: list[Array]) -> str:
+    """That the grid is not the one that was asked for, and not the one that would do."""
+    count = len(problem.times) - 1
+    said = f"on {count} intervals: the {asked} of timing.steps are too few for path.tolerance" * (count > asked)
+    more = options.refine_to is not None and finer(problem, MOST, motions) is not None
+    return "; ".join(filter(None, [said, f"method.global.refine_to = {options.refine_to} allows no more" * more]))
 
 
 def no_start(problem: Problem, drawn: int) -> str:
