@@ -15,13 +15,13 @@ from scipy.interpolate import CubicSpline
 
 from pipeline.common.arrays import Array
 from pipeline.config.methods import GlobalOptions
-from pipeline.methods.global_planner.apart import apart, keeps_own, without_own
+from pipeline.methods.global_planner.apart import AGAIN, apart, keeps_own, nearest, without_own
 from pipeline.methods.global_planner.basins import Basins, basins, ceiling
 from pipeline.methods.global_planner.batch import JUMPS, Batch
 from pipeline.methods.global_planner.grids import coarsest, finer, on_knots, refinement, served
 from pipeline.methods.global_planner.optimum import Optimum, go_on, optimise_start, refine
 from pipeline.methods.global_planner.ranking import in_order
-from pipeline.methods.global_planner.reasons import counted, no_feasible, no_optimum, no_start
+from pipeline.methods.global_planner.reasons import counted, no_feasible, no_optimum, no_start, other_grid, too_near
 from pipeline.methods.global_planner.smooth import freer, nothing, rough, smooth, splined, unserved
 from pipeline.methods.global_planner.starts import Known, Starts
 from pipeline.methods.global_planner.timed import timed
@@ -41,6 +41,8 @@ STEPS = 25  # intervals of the coarsest grid: 12 miss optima
 STEPS_ALONE = 12  # where each start costs a solve of its own
 DEAREST = 3.5  # times the best: dearer optima are not refined, nor does it count that they are new
 MOST_SOLVED = 30_000  # intervals of all starts on the coarsest grid: on a longer one there are fewer
+FEW = 4  # optima on the coarse grid that are refined with rows that keep the arm off itself: seconds each
+LOST = "optima_too_near_to_the_arm"  # in the statistics: it is not the limits that leave none
 HOPELESS = 0.1  # relative violation on a coarse grid from which on finer ones are not tried
 
 
@@ -52,7 +54,7 @@ def solve(problem: Problem, options: GlobalOptions, context: Context, known: Kno
         return loosened(problem, by_differences(exactly(problem), options, context), options, context)
     first = (freer if problem.free_timing else rough)(problem)
     found = by_differences(first, options, context, known)
-    if not found[0].found and first.constrained and not problem.free_timing:
+    if not found[0].found and first.constrained and not problem.free_timing and LOST not in found[0].statistics:
         again = by_differences(freer(problem), options, context, known)
         found = max(found, again, key=lambda motions: motions[0].found)
     if found[0].found:  # on the knots that the path needs
@@ -115,8 +117,9 @@ def by_differences(
     log["barren_starts"] = coarse.barren
     context.phase("refining and confirming")
     before, refined = (problem, grids), list[Optimum]()
-    while len(refined) < len(coarse.optima) and not any(map(_good, refined)):
-        lot = coarse.optima[len(refined) : len(refined) + served(before[0])]
+    most = FEW if keeps_own(problem) else len(coarse.optima)
+    while len(refined) < min(most, len(coarse.optima)) and not any(map(_good, refined)):
+        lot = coarse.optima[len(refined) : min(most, len(refined) + served(before[0]))]
         problem, grids, fine_ones = _to_the_end(*before, options, lot, batch, context)
         refined += fine_ones
     log["grids"] = [len(grid) - 1 for grid in grids]
@@ -126,12 +129,12 @@ def by_differences(
         best = min((fine.cost for fine, _ in found), default=np.inf)
         sent = [pair for pair in found if pair[0].cost == best or finer(problem, MOST, [pair[0].q]) is None]
         log["optima_off_path"], found = len(found) - len(sent), sent
-    clear = apart(replace(given, times=problem.times), [fine for fine, _ in found], options, context) if lazy else []
     if lazy and found:
+        problem, near = replace(given, times=problem.times), [fine for fine, _ in found]
+        clear = apart(problem, near, options, context)
         found = [(fine, members) for fine, (_, members) in zip(clear, found, strict=True) if _good(fine)]
         if not found:
-            return by_differences(given, options, context, known, lazy=False)
-        problem = replace(given, times=problem.times)
+            return _kept_off(given, problem, near, options, context, known)
     log["jumping_optima"] = coarse.jumping + sum(fine.converged and not fine.continuous for fine in refined)
     if not found:
         why_not = no_optimum(problem, grids[0], starts, refined, coarse.jumping)
@@ -141,7 +144,7 @@ def by_differences(
     words = counted(len(ranked), len(starts), coarse.barren, left)
     solutions = []
     for rank, (fine, moved) in enumerate(ranked):
-        said = _said(problem, asked, options, [fine.q]) if rank == 0 else ""
+        said = other_grid(problem, asked, options, [fine.q]) if rank == 0 else ""
         own = {"starts_in_basin": members[id(fine)], **(log if rank == 0 else {})}
         solution = as_solution(problem, fine, options)
         solutions.append(
@@ -154,6 +157,21 @@ def by_differences(
             )
         )
     return solutions
+
+
+def _kept_off(
+    given: Problem, problem: Problem, near: list[Optimum], options: GlobalOptions, context: Context, known: Known | None
+) -> list[Solution]:
+    """Every start kept off the arm itself from the beginning: all optima, `near` it, are lost."""
+    context.phase("keeping the arm off itself")
+    options = replace(options, max_iterations=min(options.max_iterations, AGAIN))
+    found = by_differences(given, options, context, known, lazy=False)
+    log = {**found[0].statistics, LOST: len(near)}
+    return (
+        found
+        if found[0].found
+        else [replace(found[0], message=too_near(problem, len(near), nearest(problem, near)), statistics=log)]
+    )
 
 
 def as_solution(problem: Problem, optimum: Optimum, options: GlobalOptions) -> Solution:
@@ -219,14 +237,6 @@ def _cheapest(optima: list[Optimum]) -> list[Array]:
     """The motion of the best, if there is one."""
     good = [optimum for optimum in optima if _good(optimum)]
     return [min(good, key=lambda optimum: optimum.cost).q] if good else []
-
-
-def _said(problem: Problem, asked: int, options: GlobalOptions, motions: list[Array]) -> str:
-    """That the grid is not the one that was asked for, and not the one that would do."""
-    count = len(problem.times) - 1
-    said = f"on {count} intervals: the {asked} of timing.steps are too few for path.tolerance" * (count > asked)
-    more = options.refine_to is not None and finer(problem, MOST, motions) is not None
-    return "; ".join(filter(None, [said, f"method.global.refine_to = {options.refine_to} allows no more" * more]))
 
 
 def _draw_on(

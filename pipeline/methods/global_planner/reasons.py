@@ -9,9 +9,13 @@ from collections import Counter
 import numpy as np
 
 from pipeline.common.arrays import Array
+from pipeline.config.methods import GlobalOptions
+from pipeline.evaluation.certified import Closest, said
+from pipeline.methods.global_planner.grids import finer
 from pipeline.methods.global_planner.optimum import Optimum
 from pipeline.model.kinematics import ATTEMPTS, reach
 from pipeline.problem.problem import Problem
+from pipeline.problem.resolution import MOST
 from pipeline.program.feasibility import Relaxed, violations
 
 OTHERS = "more starts (method.global.optimised) or other ones (method.global.starts)"
@@ -72,6 +76,27 @@ def no_optimum(problem: Problem, grid: Array, starts: list[Optimum], refined: li
         f"none of {len(starts)} starts converged (most often: {words}){_nearest(problem, grid, starts)}; "
         f"try more iterations (method.global.max_iterations), {OTHERS}"
     )
+
+
+def too_near(problem: Problem, optima: int, closest: Closest) -> str:
+    """Every optimum comes too near to the arm itself, and none does where it has to keep off: which pair, which key."""
+    own = problem.own
+    assert own is not None
+    lost = "the optimum found comes" if optima == 1 else f"all {optima} optima found come"
+    return (
+        f"{lost} too near to the arm itself ({said(closest)}, collision.margin = {own.margin:.3g} m), and where that "
+        "is kept none was found; if these may come so near, say so: "
+        f"collision.allow=[[{closest.first},{closest.second}]], or by a smaller collision.margin or an SRDF "
+        "(collision.srdf)"
+    )
+
+
+def other_grid(problem: Problem, asked: int, options: GlobalOptions, motions: list[Array]) -> str:
+    """That the grid is not the one that was asked for, and not the one that would do."""
+    count = len(problem.times) - 1
+    said = f"on {count} intervals: the {asked} of timing.steps are too few for path.tolerance" * (count > asked)
+    more = options.refine_to is not None and finer(problem, MOST, motions) is not None
+    return "; ".join(filter(None, [said, f"method.global.refine_to = {options.refine_to} allows no more" * more]))
 
 
 def unmet(status: str, violation: float, optimality: float) -> str:
