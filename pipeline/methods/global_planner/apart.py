@@ -15,13 +15,16 @@ from pipeline.evaluation.certified import Closest, lacking, near
 from pipeline.evaluation.clearance import Clearance
 from pipeline.methods.global_planner.batch import Batch
 from pipeline.methods.global_planner.optimum import Optimum, cleared, stays_on_path
+from pipeline.methods.global_planner.reasons import too_near
 from pipeline.methods.method import Context
 from pipeline.problem.curve import whole
 from pipeline.problem.problem import Problem
-from pipeline.problem.solution import Trajectory
+from pipeline.problem.solution import Solution, Trajectory
 from pipeline.program.spline.curve import Curve
 
 AGAIN = 100  # iterations of an optimum that is solved again: those that need more do not end well
+FEW = 4  # optima on the coarse grid that are refined with these rows: seconds each
+LOST = "optima_too_near_to_the_arm"  # in the statistics: it is not the limits that leave none
 
 
 def keeps_own(problem: Problem) -> bool:
@@ -46,6 +49,14 @@ def apart(problem: Problem, optima: list[Optimum], options: GlobalOptions, conte
     best = min((one.cost for k, one in enumerate(optima) if k not in short), default=np.inf)
     again = iter(context.workers.map(solved_again, (problem, problem.times, options, best), [optima[k] for k in short]))
     return [next(again) if k in short else optimum for k, optimum in enumerate(optima)]
+
+
+def blamed(problem: Problem, near: list[Optimum], found: list[Solution]) -> list[Solution]:
+    """What was found where every start keeps off the arm itself, after all optima, `near` it, were lost."""
+    if found[0].found:
+        return found
+    log = {**found[0].statistics, LOST: len(near)}
+    return [replace(found[0], message=too_near(problem, len(near), nearest(problem, near)), statistics=log)]
 
 
 def nearest(problem: Problem, optima: list[Optimum]) -> Closest:

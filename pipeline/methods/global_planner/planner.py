@@ -15,13 +15,13 @@ from scipy.interpolate import CubicSpline
 
 from pipeline.common.arrays import Array
 from pipeline.config.methods import GlobalOptions
-from pipeline.methods.global_planner.apart import AGAIN, apart, keeps_own, nearest, without_own
+from pipeline.methods.global_planner.apart import AGAIN, FEW, LOST, apart, blamed, keeps_own, without_own
 from pipeline.methods.global_planner.basins import Basins, basins, ceiling
 from pipeline.methods.global_planner.batch import JUMPS, Batch
 from pipeline.methods.global_planner.grids import coarsest, finer, on_knots, refinement, served
 from pipeline.methods.global_planner.optimum import Optimum, go_on, optimise_start, refine
 from pipeline.methods.global_planner.ranking import in_order
-from pipeline.methods.global_planner.reasons import counted, no_feasible, no_optimum, no_start, other_grid, too_near
+from pipeline.methods.global_planner.reasons import counted, no_feasible, no_optimum, no_start, other_grid
 from pipeline.methods.global_planner.smooth import freer, nothing, rough, smooth, splined, unserved
 from pipeline.methods.global_planner.starts import Known, Starts
 from pipeline.methods.global_planner.timed import timed
@@ -41,8 +41,6 @@ STEPS = 25  # intervals of the coarsest grid: 12 miss optima
 STEPS_ALONE = 12  # where each start costs a solve of its own
 DEAREST = 3.5  # times the best: dearer optima are not refined, nor does it count that they are new
 MOST_SOLVED = 30_000  # intervals of all starts on the coarsest grid: on a longer one there are fewer
-FEW = 4  # optima on the coarse grid that are refined with rows that keep the arm off itself: seconds each
-LOST = "optima_too_near_to_the_arm"  # in the statistics: it is not the limits that leave none
 HOPELESS = 0.1  # relative violation on a coarse grid from which on finer ones are not tried
 
 
@@ -65,26 +63,32 @@ def solve(problem: Problem, options: GlobalOptions, context: Context, known: Kno
 
 
 def by_differences(
-    problem: Problem, options: GlobalOptions, context: Context, known: Known | None = None, lazy: bool = True
+    problem: Problem, options: GlobalOptions, context: Context, known: Known | None = None
 ) -> list[Solution]:
     """The same on the knots alone, as the papers have it.
 
-    lazy: of the arm itself only the starts keep clear; of the optima those that come too near to it are solved again,
-    and where none of them is left, all is.
+    Of the arm itself only the starts keep clear; of the optima those that come too near to it are solved again. Where
+    none of them is left, all is.
     """
-    given, lazy = problem, lazy and keeps_own(problem)
-    why = Batch.without(without_own(problem) if lazy else problem, options)
+    return _searched(problem, without_own(problem) if keeps_own(problem) else problem, options, context, known)
+
+
+def _searched(
+    given: Problem, problem: Problem, options: GlobalOptions, context: Context, known: Known | None
+) -> list[Solution]:
+    """The optima of `problem` from starts of the given one, then solved as that; where all are lost, of that alone."""
+    posed, afterwards = given, given is not problem
+    why = Batch.without(problem, options)
     times, too_coarse = on_knots(problem, options.refine_to)
     if too_coarse:
         return [nothing(problem, Status.NOT_CONVERGED, too_coarse, {})]
-    asked, problem = len(problem.times) - 1, replace(problem, times=times)
+    asked = len(problem.times) - 1
+    given, problem = replace(given, times=times), replace(problem, times=times)
     shape = coarsest(problem, options.coarse_steps, STEPS if why is None else STEPS_ALONE)
     grids = refinement(times, shape, shape if options.coarse_steps is None else 2)
     context.phase("drawing starts")
-    drawn = Starts(problem, grids[0], options, np.random.default_rng(context.seed), known)
+    drawn = Starts(given, grids[0], options, np.random.default_rng(context.seed), known)
     motions, log = drawn.first, drawn.log
-    if lazy:
-        problem = without_own(problem)
     if not len(motions):
         return [nothing(problem, Status.INFEASIBLE, no_start(problem, log.get("drawn", 0)), log)]
 
@@ -129,12 +133,14 @@ def by_differences(
         best = min((fine.cost for fine, _ in found), default=np.inf)
         sent = [pair for pair in found if pair[0].cost == best or finer(problem, MOST, [pair[0].q]) is None]
         log["optima_off_path"], found = len(found) - len(sent), sent
-    if lazy and found:
+    if afterwards and found:
         problem, near = replace(given, times=problem.times), [fine for fine, _ in found]
         clear = apart(problem, near, options, context)
         found = [(fine, members) for fine, (_, members) in zip(clear, found, strict=True) if _good(fine)]
         if not found:
-            return _kept_off(given, problem, near, options, context, known)
+            context.phase("keeping the arm off itself")
+            options = replace(options, max_iterations=min(options.max_iterations, AGAIN))
+            return blamed(problem, near, _searched(posed, posed, options, context, known))
     log["jumping_optima"] = coarse.jumping + sum(fine.converged and not fine.continuous for fine in refined)
     if not found:
         why_not = no_optimum(problem, grids[0], starts, refined, coarse.jumping)
@@ -159,21 +165,6 @@ def by_differences(
     return solutions
 
 
-def _kept_off(
-    given: Problem, problem: Problem, near: list[Optimum], options: GlobalOptions, context: Context, known: Known | None
-) -> list[Solution]:
-    """Every start kept off the arm itself from the beginning: all optima, `near` it, are lost."""
-    context.phase("keeping the arm off itself")
-    options = replace(options, max_iterations=min(options.max_iterations, AGAIN))
-    found = by_differences(given, options, context, known, lazy=False)
-    log = {**found[0].statistics, LOST: len(near)}
-    return (
-        found
-        if found[0].found
-        else [replace(found[0], message=too_near(problem, len(near), nearest(problem, near)), statistics=log)]
-    )
-
-
 def as_solution(problem: Problem, optimum: Optimum, options: GlobalOptions) -> Solution:
     """An optimum on the knots of the problem as an answer of the planner."""
     return Solution(
@@ -190,28 +181,36 @@ def as_solution(problem: Problem, optimum: Optimum, options: GlobalOptions) -> S
 
 
 def finish(
-    problem: Problem, times: Array, motions: Array, options: GlobalOptions, context: Context, lazy: bool = True
+    problem: Problem, times: Array, motions: Array, options: GlobalOptions, context: Context
 ) -> tuple[Array, list[Optimum]]:
     """The distinct optima, best first, to which motions (S, N + 1, n) on the knots `times` lead, and the knots that
-    they are on: the problem's, or those that its path needs. Motions that are lost on the way are left out. lazy: see
-    `by_differences`.
+    they are on: the problem's, or those that its path needs. Motions that are lost on the way are left out. Of the arm
+    itself they are kept clear as `by_differences` does.
     """
+    if not keeps_own(problem):
+        return _finished(problem, times, motions, options, context)
+    knots, good = _finished(without_own(problem), times, motions, options, context)
+    if good:
+        given = replace(problem, times=knots)
+        good = [optimum for optimum in apart(given, good, options, context) if _good(optimum)]
+        if not good:
+            return _finished(problem, times, motions, options, context)
+    return knots, basins(problem, knots, good, options.same_path).optima
+
+
+def _finished(
+    problem: Problem, times: Array, motions: Array, options: GlobalOptions, context: Context
+) -> tuple[Array, list[Optimum]]:
     knots, too_coarse = on_knots(problem, options.refine_to)
     if too_coarse:
         return knots, []
-    given, lazy = problem, lazy and keeps_own(problem)
-    problem = replace(without_own(problem) if lazy else problem, times=knots)
+    problem = replace(problem, times=knots)
     batch = Batch(problem, options) if Batch.without(problem, options) is None else None
     grids = [times, *(grid for grid in refinement(knots, len(times)) if len(grid) > len(times))]
     starts = _optimise_starts(problem, times, options, motions, batch, context)
     chosen = basins(problem, times, starts, options.same_path).optima
     problem, _, refined = _to_the_end(problem, grids, options, chosen, batch, context)
     good = [optimum for optimum in refined if _good(optimum)]
-    if lazy and good:
-        problem = replace(given, times=problem.times)
-        good = [optimum for optimum in apart(problem, good, options, context) if _good(optimum)]
-        if not good:
-            return finish(given, times, motions, options, context, lazy=False)
     return problem.times, basins(problem, problem.times, good, options.same_path).optima
 
 

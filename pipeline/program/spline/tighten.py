@@ -136,20 +136,23 @@ def tighten(
 
     Where a limit is exceeded in an interval its bounds at both knots are divided by that excess and a little more; from
     round to round by more of it, since what lies between two knots may give way by less than they do. Of the shortest
-    motion the time changes with them. begin: where `first` came from, on its knots; what comes too near to something is
+    motion the time changes with them. Limits of torque and power that the first solve left out stay out while they are
+    kept. begin: where `first` came from, on its knots; what comes too near to something is
     solved again from there: from where it touches IPOPT may be long in finding another way round.
     """
     solved, further, tightened = first, [], Tightened.none(problem, first.curve.times)
+    loose = not first.program.forces
     for count in range(ROUNDS):
         posed, curve = solved.timed(problem).slowed(solved.stretch), solved.curve.stretched(solved.stretch)
         lacking = short(posed, curve)
         stricter = _stricter(posed, curve, tightened, 1.0 + count, lacking)
         if stricter is None or not solved.outcome.converged:
             break
-        tightened = stricter
+        tightened, loose = stricter, loose and keeps_forces(posed, curve)
         stretch = 0.0 if solved.program.stretch is None else solved.stretch
         start = begin if lacking and begin is not None else solved.curve
-        solved = transcribe(solved.timed(problem), start, tightened, stretch=stretch).solve(**options)
+        again = solved.timed(without_forces(problem) if loose else problem)
+        solved = transcribe(again, start, tightened, stretch=stretch).solve(**options)
         further.append(solved)
     return solved, further
 
