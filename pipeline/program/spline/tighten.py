@@ -15,6 +15,7 @@ from pipeline.program.feasibility import Violation
 from pipeline.program.spline.curve import Curve
 from pipeline.program.spline.program import Solved, Tightened
 from pipeline.program.spline.transcription import transcribe
+from pipeline.program.terms.tracking import INSIDE
 
 BETWEEN = 10  # points per interval
 
@@ -66,17 +67,30 @@ def excesses(problem: Problem, curve: Curve) -> dict[str, Array]:
 
 
 def _off_path(problem: Problem, moments: Array, q: Array) -> dict[str, Any]:
-    """By how much a path's tolerances are exceeded where it need not be kept exactly, each (K, 1)."""
+    """By how much a path's tolerances, less what the walls of its tube leave of them, are exceeded where it need not be
+    kept exactly, each (K, 1).
+    """
     reference = problem.reference
     if reference.exact:
         return {}
     error, count = problem.task.error(q, reference.position(moments)), len(problem.task.axes)
     kinds = {"tolerance": error[:, :count], "orientation_tolerance": error[:, count:]}
     return {
-        kind: np.linalg.norm(part, axis=1, keepdims=True) / allowed - 1
+        kind: peaks(moments, np.linalg.norm(part, axis=1))[:, None] / (allowed * (1 - INSIDE)) - 1
         for (kind, part), allowed in zip(kinds.items(), reference.tolerances, strict=True)
         if part.size
     }
+
+
+def peaks(moments: Array, values: Array) -> Array:
+    """The values (K,); those that their neighbours do not exceed, as the peak of the parabola through all three."""
+    h, slopes = np.diff(moments), np.diff(values) / np.diff(moments)
+    bend = np.diff(slopes) / (h[:-1] + h[1:])
+    slope = (slopes[:-1] * h[1:] + slopes[1:] * h[:-1]) / (h[:-1] + h[1:])
+    highest = (slopes[:-1] >= 0) & (slopes[1:] <= 0) & (bend < 0)
+    found = values.copy()
+    found[1:-1][highest] -= slope[highest] ** 2 / (4 * bend[highest])
+    return found
 
 
 def _pace(problem: Problem, q: Array, v: Array, a: Array) -> dict[str, Any]:
@@ -136,7 +150,8 @@ def tighten(
 
     Where a limit is exceeded in an interval its bounds at both knots are divided by that excess and a little more; from
     round to round by more of it, since what lies between two knots may give way by less than they do. Of the shortest
-    motion the time changes with them. begin: where `first` came from, on its knots; what comes too near to something is
+    motion the time changes with them. Limits of torque and power that the first solve left out stay out while they are
+    kept. begin: where `first` came from, on its knots; what comes too near to something is
     solved again from there: from where it touches IPOPT may be long in finding another way round.
     """
     solved, further, tightened = first, [], Tightened.none(problem, first.curve.times)
@@ -149,7 +164,9 @@ def tighten(
         tightened = stricter
         stretch = 0.0 if solved.program.stretch is None else solved.stretch
         start = begin if lacking and begin is not None else solved.curve
-        solved = transcribe(solved.timed(problem), start, tightened, stretch=stretch).solve(**options)
+        lazy = not solved.program.forces and keeps_forces(posed, curve)
+        again = without_forces(solved.timed(problem)) if lazy else solved.timed(problem)
+        solved = transcribe(again, start, tightened, stretch=stretch, prices=solved.program.prices).solve(**options)
         further.append(solved)
     return solved, further
 
