@@ -99,6 +99,7 @@ def test_the_tool_is_where_its_link_is(floats: bool, rng: np.random.Generator) -
     rpy = tuple(Rotation.from_rotvec(turns[1]).as_euler("xyz").tolist())
     there = Mounting(base_position=tuple(base.position[1].tolist()), base_rpy=rpy) if floats else start
     wanted = Places(Arm(description, there))(q[1])["tool"]
+    np.testing.assert_allclose(wanted[1], Arm(description, there).position(q[1:])[0], atol=1e-12)
     np.testing.assert_allclose(rotation[0], wanted[0], atol=1e-12)
     np.testing.assert_allclose(position[0], wanted[1], atol=1e-12)
     (bar,) = scene.carried(arm, e, np.array([1]))

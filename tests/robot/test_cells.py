@@ -225,5 +225,8 @@ def test_other_limbs_are_drawn_where_they_are_held() -> None:
     assert not any(shape.name.startswith("left") for shape in drawn)
     for shape in drawn:
         np.testing.assert_allclose(shape.position, there[shape.name], atol=1e-9)
+    panda = load(composed("robot=panda").robot)
+    assert panda.description.aside
+    assert scene.limbs(cast(Problem, SimpleNamespace(task=SimpleNamespace(arm=panda), own=own))) == ()
     unknown = replace(own, unknown="a mesh is missing")
     assert scene.limbs(cast(Problem, SimpleNamespace(task=SimpleNamespace(arm=arm), own=unknown))) == ()

@@ -103,11 +103,11 @@ def test_what_drake_ships() -> None:
 
 def test_planes_are_half_spaces(folder: Path) -> None:
     """Whose z axis is the plane's normal."""
-    plane = "<plane><normal>0 1 0</normal></plane>"
+    plane = "<plane><normal>1 0 0</normal></plane>"
     text = WORLD.replace("<sphere><radius>0.02</radius></sphere>", plane)
     (folder / "world.sdf").write_text(text, encoding="utf-8")
     (wall,) = (shape for shape in world.read(folder / "world.sdf") if shape.kind == "half_space")
-    normal = Rotation.from_euler("y", 0.1 + np.pi / 2).apply([0.0, 1.0, 0.0])
+    normal = Rotation.from_euler("y", 0.1 + np.pi / 2).apply([1.0, 0.0, 0.0])
     np.testing.assert_allclose(Rotation.from_rotvec(wall.rotation).apply([0.0, 0.0, 1.0]), normal, atol=1e-12)
 
 
