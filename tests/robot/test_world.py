@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,11 +13,11 @@ from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.systems.framework import DiagramBuilder
 from scipy.spatial.transform import Rotation
 
-from pipeline.build.problem import prepare
-from pipeline.common.errors import ConfigError, RobotError
+from pipeline.build.goal import make_obstacles
+from pipeline.common.errors import RobotError
 from pipeline.robot import world
 from pipeline.robot.packages import find
-from tests.support import composed
+from tests.support import composed, robot
 
 DRAKE = "package://pydrake/share/drake/examples/"
 TABLE = """<sdf version="1.9"><model name="table"><link name="top"><pose>0 0 0.7 0 0 0.2</pose>
@@ -46,7 +47,6 @@ ROOM = """<robot name="r"><link name="room"/><link name="shelf"><collision><orig
 </robot>"""
 FILES = {"table.sdf": TABLE, "world.sdf": WORLD, "part.obj": OBJ, "room.urdf": ROOM}
 CELL = "obstacles.file=robots/cell.sdf"
-SHORT = ("robot=panda", "path.direction=[0,1,0]", "path.length=0.01", "timing.steps=8")
 
 
 @pytest.fixture
@@ -150,11 +150,10 @@ def test_a_mesh_that_is_missing_names_its_model(folder: Path) -> None:
 def test_a_cell_around_the_arm() -> None:
     """The one that comes with the project, with shapes beside it."""
     ball = "+obstacles.shapes.ball={kind: sphere, center: [0, 0, 1.5]}"
-    problem = prepare(composed(*SHORT, ball, CELL, "collision.self=false"))
-    assert problem.obstacles is not None
-    names = [shape.name for shape in problem.obstacles.shapes]
+    config = composed("robot=planar4r", ball, CELL)
+    obstacles = make_obstacles(config.obstacles, config.collision, robot("planar4r"))
+    assert obstacles is not None
+    names = [shape.name for shape in obstacles.shapes]
     assert names == ["ball", "ground", "bench", "bench", "bench", "post", "bin::back", "bin::side"]
     with pytest.raises(RobotError, match=r"obstacles\.file = .*nowhere\.sdf: no such file"):
-        prepare(composed(*SHORT, "obstacles.file=nowhere.sdf"))
-    with pytest.raises(ConfigError, match=r"obstacles: .* has no collision shapes"):
-        prepare(composed("robot=planar3r", CELL))
+        make_obstacles(replace(config.obstacles, file="nowhere.sdf"), config.collision, robot("planar4r"))
