@@ -15,7 +15,7 @@ from matplotlib.animation import FFMpegWriter, FuncAnimation, PillowWriter
 from pipeline.artifacts.figures import solids
 from pipeline.artifacts.figures.panels import INK, PATH, new_figure
 from pipeline.artifacts.report import Report
-from pipeline.artifacts.scene import outlines, path_in_world
+from pipeline.artifacts.scene import around, outlines, path_in_world
 from pipeline.common.arrays import Array
 from pipeline.common.files import write_beside
 from pipeline.evaluation.evaluation import Evaluation
@@ -68,7 +68,7 @@ def draw(report: Report, motions: list[Evaluation]) -> FuncAnimation:
         axes.set_aspect("equal")
     else:
         axes.set_box_aspect(high - low)
-    for shape in problem.obstacles.shapes if problem.obstacles is not None else ():
+    for shape in around(problem, points):
         solids.draw(axes, shape, dims)
     axes.plot(*path[:, dims].T, color=PATH, linewidth=5, alpha=0.25)
     lines = [

@@ -5,18 +5,24 @@ of a floating base.
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
+from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 from pipeline.common.arrays import Array
 from pipeline.evaluation.base import BaseMotion
+from pipeline.evaluation.evaluation import Evaluation
 from pipeline.model.arm import Arm
+from pipeline.model.places import Places
 from pipeline.problem.problem import Problem
 from pipeline.robot.shapes import Shape
 
 POINTS = 201  # of the path
 SMALLEST, THIN = 0.04, 0.1  # [m] of an edge; of the height of a planar arm's base, relative
+PLATE, BESIDE = 0.01, 0.1  # of the size of what stands on it: how thick a half space is drawn, and how far beyond
 
 
 def path_in_world(problem: Problem) -> Array:
@@ -24,6 +30,65 @@ def path_in_world(problem: Problem) -> Array:
     geometry = problem.reference.geometry
     path = geometry.sample(np.linspace(0.0, geometry.length, POINTS))[0]
     return problem.task.in_world(path, problem.task.arm.position(problem.q_init[None])[0])
+
+
+def around(problem: Problem, points: Array) -> tuple[Shape, ...]:
+    """The obstacles as pictures of `points` (P, 3) show them: of a half space a plate beside those points."""
+    shapes = () if problem.obstacles is None else problem.obstacles.shapes
+    own = [shape.position for shape in shapes]
+    every = np.concatenate([points.reshape(-1, 3), np.reshape(own, (-1, 3))])
+    every = every[np.isfinite(every).all(axis=1)]
+    return tuple(_plate(shape, every) if shape.kind == "half_space" else shape for shape in shapes)
+
+
+def _plate(shape: Shape, points: Array) -> Shape:
+    turn = Rotation.from_rotvec(shape.rotation)
+    across = turn.inv().apply(points - shape.position)[:, :2]
+    low, high = across.min(axis=0), across.max(axis=0)
+    size = float(np.linalg.norm(high - low)) or 1.0
+    edges = high - low + 2 * BESIDE * size
+    middle = shape.position + turn.apply([*((low + high) / 2), 0.0])
+    return replace(shape, size=(*map(float, edges), PLATE * size), position=tuple(map(float, middle)))
+
+
+def tool_poses(arm: Arm, e: Evaluation, rows: Any) -> tuple[Array, Array]:
+    """Where what is fixed to the end effector is at some knots: rotations (K, 3, 3), positions (K, 3) [m]."""
+    places, mounting, tool = Places(arm.on_fixed_base), arm.mounting, arm.description.tool
+    q = e.q[rows]
+    turned, place = np.full((len(q), 3, 3), np.nan), np.full((len(q), 3), np.nan)
+    if not tool:
+        return turned, place
+    for k in np.flatnonzero(np.isfinite(q).all(axis=1)):
+        turned[k], place[k] = places(q[k])[tool]
+    if arm.base.count:  # from where the root link started to where it is
+        start = Rotation.from_euler("xyz", mounting.base_rpy).as_matrix().T
+        place = np.einsum("kij,kj->ki", e.base.rotation[rows] @ start, place - mounting.base_position)
+        turned, place = e.base.rotation[rows] @ start @ turned, place + e.base.position[rows]
+    return turned, place
+
+
+def carried(arm: Arm, e: Evaluation, rows: Any) -> list[Shape]:
+    """What is fixed to the end effector, in the world at some knots at which the arm has a pose."""
+    poses = [pose for pose in zip(*tool_poses(arm, e, rows), strict=True) if np.isfinite(pose[1]).all()]
+    return [shape.moved(*pose) for pose in poses for shape in arm.description.attached]
+
+
+def hull(points: Array) -> list[list[int]]:
+    """The faces of the convex hull of points (P, 3): the numbers of their corners, in turn."""
+    found = ConvexHull(points)
+    faces: dict[tuple[float, ...], set[int]] = {}
+    scale = float(np.ptp(points, axis=0).max())
+    for triangle, plane in zip(found.simplices, found.equations, strict=True):
+        key = tuple(np.round([*plane[:3], plane[3] / scale], 6) + 0.0)
+        faces.setdefault(key, set()).update(map(int, triangle))
+    ordered = []
+    for key, numbers in faces.items():
+        corners = np.array(sorted(numbers))
+        out = points[corners] - points[corners].mean(axis=0)
+        along = out[0] / np.linalg.norm(out[0])
+        angle = np.arctan2(out @ np.cross(key[:3], along), out @ along)
+        ordered.append(corners[np.argsort(angle)].tolist())
+    return ordered
 
 
 def box(arm: Arm) -> Shape:

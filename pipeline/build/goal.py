@@ -17,9 +17,11 @@ from pipeline.model.obstacles import Obstacles
 from pipeline.problem.limits import Limits
 from pipeline.problem.objective import Objective
 from pipeline.problem.secondary import Secondary
+from pipeline.robot import world
 from pipeline.robot.joint_limits import read
 from pipeline.robot.limits import UNLIMITED
 from pipeline.robot.packages import find
+from pipeline.robot.shapes import SLAB, Shape
 
 
 def make_limits(limits: LimitsConfig, arm: Arm, own: str | None = None) -> Limits:
@@ -84,11 +86,14 @@ def make_objective(config: RunConfig, arm: Arm) -> Objective:
 
 
 def make_obstacles(obstacles: ObstaclesConfig, arm: Arm) -> Obstacles | None:
-    if not obstacles.shapes:
+    if not obstacles.any:
         return None
     if not arm.description.collision:
-        raise ConfigError(
-            f"obstacles.shapes: {arm.description.name} has no collision shapes; give them in robot.collision"
-        )
-    shapes = tuple(make_shape(name, shape) for name, shape in obstacles.shapes.items())
-    return Obstacles(shapes, obstacles.margin, obstacles.influence)
+        raise ConfigError(f"obstacles: {arm.description.name} has no collision shapes; give them in robot.collision")
+    shapes = [make_shape(name, shape) for name, shape in obstacles.shapes.items()]
+    if obstacles.file is not None:
+        shapes += world.read(find(obstacles.file, "obstacles.file"))
+    if obstacles.floor is not None:
+        x, y, _ = arm.mounting.base_position
+        shapes.append(Shape("floor", "half_space", SLAB, (x, y, obstacles.floor)))
+    return Obstacles(tuple(shapes), obstacles.margin, obstacles.influence)

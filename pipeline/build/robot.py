@@ -20,6 +20,7 @@ from pipeline.robot.description import Description
 from pipeline.robot.mounting import Mounting
 from pipeline.robot.packages import find
 from pipeline.robot.shapes import Shape, capsule
+from pipeline.robot.tool import with_tool
 
 GRAVITY = {"none": (0.0, 0.0, 0.0), "earth": (0.0, 0.0, -9.80665)}  # [m/s^2]
 
@@ -37,6 +38,8 @@ def load(robot: RobotConfig, gravity: str | Sequence[float] = "none") -> Arm:
     if robot.collision != "file":
         shapes = _link_shapes(robot.collision, description)
         description = replace(description, collision=shapes)
+    if robot.tool:
+        description = with_tool(description, [make_shape("tool", shape) for shape in robot.tool])
     if isinstance(robot.armature, tuple) and len(robot.armature) != len(description.joints):
         raise ConfigError(
             f"robot.armature has {len(robot.armature)} values, the arm has {len(description.joints)} moving joints"

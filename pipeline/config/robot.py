@@ -106,6 +106,13 @@ class RobotConfig:
             "{link: [{kind: sphere, box, capsule, cylinder or mesh, ...}, ...]}"
         ),
     ] = "file"
+    tool: Annotated[
+        tuple[Shape, ...],
+        Field(
+            description="[{kind: sphere, box, capsule, cylinder or mesh, ...}, ...] fixed to the link end_effector, in "
+            "its frame: a tool, or what a gripper holds; nothing but a shape, its mass is payload's"
+        ),
+    ] = ()
     srdf: Annotated[
         Text | None, Field(description="SRDF that comes with the file: which links may touch; null: none")
     ] = None
@@ -182,6 +189,18 @@ class ObstaclesConfig:
         dict[str, Shape],
         Field(description="{name: {kind: sphere, box, capsule, cylinder or mesh, ...}, ...} in the world"),
     ] = field(default_factory=dict)
+    file: Annotated[
+        Text | None,
+        Field(description="SDF (a world too) or URDF of what stands still, in the world; null: none"),
+    ] = None
+    floor: Annotated[
+        Position | None, Field(description="[m] height of a floor: all below it is solid; null: there is none")
+    ] = None
+
+    @property
+    def any(self) -> bool:
+        """Whether there is something to be clear of."""
+        return bool(self.shapes) or self.file is not None or self.floor is not None
 
 
 @schema

@@ -31,7 +31,7 @@ from pipeline.problem.curve import whole
 from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Trajectory
 
-FINE = 5e-5  # [m] where that does not tell whether a margin is kept
+FINE = 5e-5  # [m] where that does not tell whether a margin is kept, or by how much a motion falls short of it
 TOLERANCE = 1.5e-4  # [m] of the bound below a distance that the motion has
 MOST = 4_000  # distances of one motion: where they do not suffice the bound stays lower, and true
 
@@ -184,7 +184,7 @@ def closest(
     while True:
         bound, _, fresh, piece = heapq.heappop(heap) if heap else (np.inf, 0, True, Piece(0, 0.0, 1.0))
         floor = min(bound, best.bound)
-        tolerance = FINE if floor < margin <= best.bound else TOLERANCE
+        tolerance = FINE if floor < margin <= max(best.bound, enough) else TOLERANCE
         if floor >= min(best.bound - tolerance, enough) or left == 0:
             return replace(best, bound=floor)
         cut = middle(piece)

@@ -120,6 +120,9 @@ class Clearance:
         overlap, both are Drake's.
         """
         first, second = self._placed(pair)
+        if first.face is not None:
+            low = along(first, second, first.face)
+            return low, low, first.face
         if first.radius and second.radius:  # Drake may never come back from capsules whose ends meet
             return nearest(first, second)
         try:

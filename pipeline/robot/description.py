@@ -35,7 +35,7 @@ class Description:
     notes: what was read otherwise than it stands in the file, one line each. root_fault: why no body has the inertia of
     the root link, empty if one can.
     base_coordinates: how many of the joints, the first ones, are not the arm's but move its base (`spacecraft.py`), and
-    root: the link of the xml that they start from.
+    root: the link of the xml that they start from. tool: the link of what is fixed to the end effector; empty: nothing.
     """
 
     name: str
@@ -57,6 +57,12 @@ class Description:
     root_fault: str = ""
     base_coordinates: int = 0
     root: str = ""
+    tool: str = ""
+
+    @property
+    def attached(self) -> tuple[Shape, ...]:
+        """The shapes of what is fixed to the end effector, in its link's frame."""
+        return tuple(shape for shape in self.collision if self.tool and shape.frame == self.tool)
 
     @property
     def actuated(self) -> tuple[str, ...]:

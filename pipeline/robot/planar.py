@@ -17,7 +17,7 @@ def split_planar(tree: Tree) -> None:
         size = float(np.linalg.norm(planar.axis))
         if size == 0.0:
             raise tree.fail(f"joint '{planar.name}' has an axis of zeros, expected the normal of its plane")
-        turn = _onto(np.array(planar.axis) / size)
+        turn = onto(np.array(planar.axis) / size)
         del tree.joints[planar.name]
         xyz, rpy, parent = planar.xyz, planar.rpy, planar.parent
         for suffix, kind, axis in (("x", "prismatic", 0), ("y", "prismatic", 1), ("yaw", "continuous", 2)):
@@ -33,7 +33,7 @@ def split_planar(tree: Tree) -> None:
             tree.notes.append(f"the limits of the planar joint {planar.name} are not used: they name no direction")
 
 
-def _onto(normal: np.ndarray) -> Rotation:
+def onto(normal: np.ndarray) -> Rotation:
     """The shortest turn that takes z to `normal`; about x where it is half a turn."""
     axis = np.cross([0.0, 0.0, 1.0], normal)
     size = float(np.linalg.norm(axis))

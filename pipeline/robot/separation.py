@@ -26,12 +26,14 @@ STEPS = 100  # Wolfe's algorithm takes at most 13 on polytopes
 @dataclass(frozen=True)
 class Solid:
     """A convex solid in its link's frame: what is within `radius` [m] of the hull of `points` (V, 3) or, of a cylinder,
-    of the two discs of radius `rim` around its two points.
+    of the two discs of radius `rim` around its two points. face: of the slab of a half space the normal (3,) of its
+    face, along which all that is not far beyond its edges is nearest to it.
     """
 
     points: Array
     radius: float = 0.0
     rim: float = 0.0
+    face: Array | None = None
 
     @classmethod
     def of(cls, shape: Shape) -> Solid:
@@ -42,7 +44,8 @@ class Solid:
         if shape.kind in ("capsule", "cylinder"):
             ends = placed(np.array([[0.0, 0.0, 0.5], [0.0, 0.0, -0.5]]) * shape.size[1])
             return cls(ends, shape.size[0]) if shape.kind == "capsule" else cls(ends, rim=shape.size[0])
-        return cls(placed(shape.points))
+        up = placed(np.array([[0.0, 0.0, 1.0]]))[0] - shape.position if shape.kind == "half_space" else None
+        return cls(placed(shape.points), face=up)
 
     @property
     def center(self) -> Array:
@@ -55,7 +58,8 @@ class Solid:
 
     def moved(self, rotation: Array, position: Array) -> Solid:
         """The solid where its link is so."""
-        return Solid(self.points @ rotation.T + position, self.radius, self.rim)
+        face = None if self.face is None else rotation @ self.face
+        return Solid(self.points @ rotation.T + position, self.radius, self.rim, face)
 
     def support(self, n: Array) -> Array:
         """The point (3,) of its core that is farthest along the unit vector n (3,)."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +16,7 @@ from pipeline.robot.numbers import Vector, numbers, shown
 from pipeline.robot.packages import resolve
 
 CORNERS = np.stack(np.meshgrid(*[(-0.5, 0.5)] * 3), axis=-1).reshape(-1, 3)  # of the unit box
+SLAB = (1000.0, 1000.0, 10.0)  # [m] of a half space: Drake measures no hull from an endless one
 
 # The attributes that give their sizes in a URDF.
 SIZES = {
@@ -30,8 +31,9 @@ SIZES = {
 class Shape:
     """One solid in a frame: `frame` is a link, or None for the world.
 
-    kind: sphere, box, capsule, cylinder or mesh. size: (radius,), the edges (x, y, z), (radius, length) along the z
-    axis, which of a capsule is that between the centres of its caps, or the scale (x, y, z) of a mesh [m].
+    kind: sphere, box, capsule, cylinder, mesh or half_space. size: (radius,), the edges (x, y, z), (radius, length)
+    along the z axis, which of a capsule is that between the centres of its caps, the scale (x, y, z) of a mesh, or of a
+    half space the edges of the slab that stands for it: below its position, its z axis points out of it [m].
     position (3,) [m], rotation: rotation vector (3,) [rad] in the frame. file: of a mesh, which is read where its
     points are asked for; of that the convex hull counts.
     """
@@ -46,16 +48,25 @@ class Shape:
 
     @property
     def points(self) -> Array:
-        """The corners (V, 3) [m] of a box or of a mesh's hull, in the shape's own frame; raises RobotError, which
+        """The corners (V, 3) [m] of a box, a slab or a mesh's hull, in the shape's own frame; raises RobotError, which
         names whose it is, for a mesh that cannot be read.
         """
-        if self.kind == "box":
-            return CORNERS * np.array(self.size)
+        if self.kind in ("box", "half_space"):
+            corners = CORNERS * np.array(self.size)
+            return corners - [0.0, 0.0, self.size[2] / 2] if self.kind == "half_space" else corners
         try:
             return np.asarray(meshes.hull(self.file) * np.array(self.size))
         except RobotError as error:
-            whose = f"obstacles.shapes.{self.name}" if self.frame is None else f"link '{self.frame}'"
+            whose = f"obstacle {self.name}" if self.frame is None else f"link '{self.frame}'"
             raise RobotError(f"{whose}: {error}") from None
+
+    def moved(self, rotation: Array, position: Array) -> Shape:
+        """The shape in the world, its frame turned by `rotation` (3, 3) and at `position` (3,) [m]."""
+        turn = Rotation.from_matrix(rotation) * Rotation.from_rotvec(self.rotation)
+        place = rotation @ np.array(self.position) + position
+        return replace(
+            self, position=tuple(map(float, place)), rotation=tuple(map(float, turn.as_rotvec())), frame=None
+        )
 
     def placed(self, points: Array) -> Array:
         """Points (V, 3) of its own frame in the frame that it stands in."""

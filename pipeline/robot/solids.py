@@ -15,7 +15,7 @@ KINDS = {"sphere": Sphere, "box": Box, "capsule": Capsule, "cylinder": Cylinder}
 
 def solid(shape: Shape) -> Any:
     """Drake's shape; raises RobotError for a mesh that cannot be read."""
-    if shape.kind == "mesh":
+    if shape.kind in ("mesh", "half_space"):
         return Convex(points=shape.points.T, label=shape.name)
     return KINDS[shape.kind](*shape.size)
 

@@ -33,10 +33,16 @@ def groups(description: Description) -> dict[str, int]:
 
 
 def apart(description: Description) -> list[Pair]:
-    """The pairs of links with shapes between which two or more joints move, nearer the base first."""
-    own = groups(description)
+    """The pairs of links with shapes between which two or more joints move, nearer the base first; of what is fixed to
+    the end effector all those that a joint moves it against.
+    """
+    own, tool = groups(description), description.tool
     links = sorted({str(shape.frame) for shape in description.collision}, key=lambda link: own[link])
-    return [(first, second) for first, second in combinations(links, 2) if own[second] - own[first] > 1]
+    return [
+        (first, second)
+        for first, second in combinations(links, 2)
+        if own[second] - own[first] > (0 if tool in (first, second) else 1)
+    ]
 
 
 def disabled(file: Path, key: str = "collision.srdf") -> set[frozenset[str]]:

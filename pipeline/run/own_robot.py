@@ -15,12 +15,13 @@ from pipeline.common.errors import InputError
 from pipeline.common.files import shipped
 
 # What else belongs to one arm alone; where nobody says it, what conf/robot/_common.yaml does.
-BELONGS = ("limits", "srdf", "collision", "locked", "armature", "offset", "offset_rpy", "base")
+BELONGS = ("limits", "srdf", "collision", "tool", "locked", "armature", "offset", "offset_rpy", "base")
 
 
 def words(asked: Sequence[str]) -> tuple[list[str], str]:
     """What holds for the robot file that the command line names, as overrides to stand before its own, and one line
-    that says so; nothing where it names none, sweeps over several, or cannot be read (the run then says why).
+    that says so; nothing where it names none, sweeps over several, or cannot be read (the run then says why). Raises
+    RobotError for a file of several arms where no word says which.
     """
     given = {word.key_or_group: word for word in _parsed(asked)}
     urdf = given.get("robot.urdf")
@@ -36,6 +37,8 @@ def words(asked: Sequence[str]) -> tuple[list[str], str]:
     try:
         file = find(str(urdf.value()))
         tip, flat = guess.read(file, asks("base"), asks("end_effector"))
+    except guess.SeveralArmsError:
+        raise
     except (InputError, OSError):
         return [], ""
     task = "[x,y]" if flat else "[x,y,z]"

@@ -26,6 +26,9 @@ def inputs(config: RunConfig) -> dict[str, str]:
     robot = find(config.robot.urdf)
     files = {"robot.urdf": robot}
     files |= {f"robot.urdf: {name}": file for name, file in formats.files(robot).items() if file != robot}
+    if config.obstacles.file is not None:
+        world = find(config.obstacles.file, "obstacles.file")
+        files |= {f"obstacles.file: {name}": file for name, file in formats.files(world).items()}
     if isinstance(config.path, WaypointsConfig):
         files["path.file"] = find(config.path.file, "path.file")
     limits = {"limits.file": config.limits.file, "robot.limits": config.robot.limits}

@@ -57,8 +57,8 @@ def _why(group: str, key: str, config: RunConfig) -> str:
         "path.rapid": ("nothing is timed by the feeds of G-code", not feeds),
         "path.orientation_tolerance": ("robot.orientation = none", config.robot.orientation == "none"),
         "robot.pointing": (f"robot.orientation = {config.robot.orientation}", config.robot.orientation != "pointing"),
-        "obstacles.margin": ("there are no obstacles.shapes", not config.obstacles.shapes),
-        "obstacles.influence": ("there are no obstacles.shapes", not config.obstacles.shapes),
+        "obstacles.margin": ("there are no obstacles", not config.obstacles.any),
+        "obstacles.influence": ("there are no obstacles", not config.obstacles.any),
     }
     why, holds = nothing.get(f"{group}.{key}", ("", False))
     return why if holds else ""

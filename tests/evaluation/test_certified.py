@@ -47,6 +47,9 @@ def test_never_above_the_truth_and_near_it(which: str, clearance: Clearance, cur
     assert samples.min() <= found.distance + 1e-6
     early = certified.closest(clearance, pairs, curve, KNOTS, 0.0, found.bound / 2)
     assert found.bound / 2 <= early.bound <= found.distance
+    margin = found.distance + 1e-3  # that it lacks is told finely: the planner keeps off by no more than it must
+    short = certified.closest(clearance, pairs, curve, KNOTS, margin, margin)
+    assert short.distance - short.bound <= certified.FINE
 
 
 def test_no_piece_comes_nearer_than_its_bound(clearance: Clearance, rng: np.random.Generator) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -37,6 +38,20 @@ def test_a_grid_too_coarse_for_the_path_is_refined(turns: Problem) -> None:
     assert left == 0
     np.testing.assert_allclose(first.trajectory.time[::parts], turns.times, atol=1e-12)
     assert f"on {16 * parts} intervals: the 16 of timing.steps are too few" in first.message
+
+
+def test_a_wave_that_its_knots_hardly_show_is_no_jump(tmp_path: Path) -> None:
+    """Six periods on 25 and on 38 intervals: the path's own spline is nearly as far off on these as on those."""
+    along, across = np.array([np.cos(np.deg2rad(170)), np.sin(np.deg2rad(170))]), np.deg2rad(80)
+    y = np.linspace(0.0, 0.25, 241)
+    aside = 0.008 * np.sin(2 * np.pi * 6 * y / 0.25)
+    points = y[:, None] * along + aside[:, None] * [np.cos(across), np.sin(across)]
+    np.savetxt(tmp_path / "wave.csv", points, delimiter=",", header="x,y", comments="")
+    words = ("path=waypoints", f"path.file={tmp_path / 'wave.csv'}", "path.relative=true", "timing.duration=4")
+    problem = prepare(composed(*words, "timing.steps=38"))
+    judged = evaluate(problem, global_planner(problem, FEW)[0])
+    assert judged.status is Status.SOLVED
+    assert judged.tracking_error_between <= 1e-4
 
 
 def test_a_motion_that_curves_more_than_its_path_is_measured_or_said() -> None:

@@ -288,6 +288,23 @@ def test_limits_hold_between_the_knots(tight: tuple[Problem, Curve]) -> None:
     assert bool(further) == (before > 1e-7)
 
 
+@pytest.mark.parametrize(("room", "counted"), [(10.0, 0), (1.0, 3)])
+def test_forces_stay_out_of_a_solve_that_keeps_off_while_they_are_kept(
+    tight: tuple[Problem, Curve], room: float, counted: int
+) -> None:
+    """They cost several times what all else does. Where they are exceeded they come in."""
+    bounded, free = tight
+    tau = np.abs(bounded.task.arm.inverse_dynamics(free.q, free.v, free.a)).max()
+    asked = replace(bounded, objective=Objective(), limits=replace(Limits.none(3), torque=np.full(3, room * tau)))
+    first = transcribe(replace(asked, limits=None), free).solve()
+    lacking = iter([1e-3, 0.0])
+    solved, further = tighten(asked, first, lambda *_: next(lacking, 0.0))
+    assert len(first.program.forces) == 0
+    assert len(further[0].program.forces) == counted
+    assert solved.outcome.converged
+    assert keeps_forces(asked, solved.curve, -1e-6)
+
+
 def test_the_worst_excess_is_named(tight: tuple[Problem, Curve]) -> None:
     asked, free = tight
     found = worst(asked, free)

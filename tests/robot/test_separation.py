@@ -10,23 +10,17 @@ from scipy.spatial.transform import Rotation
 from pipeline.common.arrays import Array
 from pipeline.robot.separation import Solid, along, distance
 from pipeline.robot.shapes import Shape
+from tests.coal_solids import hull
 from tests.support import robot
 
 ACROSS = Rotation.from_euler("x", 90, degrees=True).as_matrix()
 CYLINDER, ROD = (Solid.of(Shape("s", kind, (0.1, 0.4), (0.0, 0.0, 0.0))) for kind in ("cylinder", "capsule"))
 
 
-def in_coal(points: Array) -> coal.ConvexBase:
-    vector = coal.StdVec_Vec3s()
-    for point in points:
-        vector.append(point)
-    return coal.ConvexBase.convexHull(vector, True, "")
-
-
 def test_hulls_against_coal(rng: np.random.Generator) -> None:
     """Where they are apart the two bounds meet at coal's distance; no direction shows more."""
     solids = [Solid.of(shape) for shape in robot("panda").description.collision if shape.kind == "mesh"]
-    theirs = [in_coal(solid.points) for solid in solids]
+    theirs = [hull(solid.points) for solid in solids]
     apart = 0
     for turn in Rotation.random(60, rng=rng):
         i, j = rng.integers(len(solids), size=2)

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 import yaml
 
+from pipeline.common.errors import RobotError
 from pipeline.config.robot import RobotConfig
 from pipeline.run import own_robot
 from tests.commands import Run
@@ -62,6 +63,22 @@ def test_what_the_file_says(tmp_path: Path) -> None:
     given = said(file, "robot.end_effector=head", "robot.q_init=[0,0]", "++robot.name=nod")
     assert not {"end_effector", "q_init", "name"} & set(given)
     assert said(urdf(tmp_path / "bare.urdf", ("revolute", "base", "flange", "1 0 0")))["end_effector"] == '"flange"'
+
+
+def test_a_gripper_is_not_of_the_arm_and_two_arms_are_not_guessed(tmp_path: Path) -> None:
+    """As the descriptions of Unitree's Z1 (one jaw) and Baxter (two arms of seven joints) have it."""
+    arm = [("revolute", "base", "l1", "0 0 1"), ("revolute", "l1", "l2", "0 1 0"), ("fixed", "l2", "stator", "0 0 1")]
+    jaw = urdf(tmp_path / "jaw.urdf", *arm, ("revolute", "stator", "gripper_mover", "0 1 0"))
+    assert said(jaw)["end_effector"] == '"stator"'
+    sides = [
+        (kind, "torso" if parent == "base" else f"{side}_{parent}", f"{side}_{child}", axis)
+        for side in ("left", "right")
+        for kind, parent, child, axis in arm
+    ]
+    two = urdf(tmp_path / "two.urdf", ("revolute", "base", "torso", "0 0 1"), *sides)
+    with pytest.raises(RobotError, match=r"^robot.end_effector must say .* 'torso' .* left_l2 or right_l2$"):
+        said(two)
+    assert "end_effector" not in said(two, "robot.end_effector=left_stator")
 
 
 @pytest.mark.parametrize(

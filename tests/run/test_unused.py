@@ -17,7 +17,7 @@ from tests.support import composed
         ("closed_loop.bandwidth=3", (), "closed_loop.run = false"),
         ("export.rate=50", ("export.method=none",), "export.method = none"),
         ("robot.pointing=[1,0,0]", (), "robot.orientation = none"),
-        ("obstacles.margin=0.1", (), "there are no obstacles.shapes"),
+        ("obstacles.margin=0.1", (), "there are no obstacles"),
     ],
 )
 def test_a_word_without_effect_is_named(word: str, others: tuple[str, ...], why: str) -> None:

@@ -11,12 +11,12 @@ from scipy.spatial import ConvexHull
 from pipeline.common.arrays import Array
 from pipeline.robot.shapes import Shape
 
-COLOR = "#C8463C"
+COLOR, GROUND = "#C8463C", "#8A8F98"
 
 
 def surface(shape: Shape) -> Array:
     """Points (P, 3) [m] on the surface of a solid in the world, of which the hull is the solid."""
-    if shape.kind in ("box", "mesh"):
+    if shape.kind in ("box", "mesh", "half_space"):
         own = shape.points
     elif shape.kind == "cylinder":
         angle = np.linspace(0.0, 2 * np.pi, 25)
@@ -38,11 +38,20 @@ def outline(shape: Shape, dims: Any = (0, 1)) -> Array:
     return flat[ConvexHull(flat).vertices]
 
 
-def draw(axes: Any, shape: Shape, dims: Any) -> None:
-    """The solid in 3-D axes, or its outline in the plane of the coordinates `dims`."""
+def draw(axes: Any, shape: Shape, dims: Any, color: str = COLOR) -> None:
+    """The solid in 3-D axes, or its outline in the plane of the coordinates `dims`; a half space in grey, and not where
+    it is looked upon from above.
+    """
+    color = GROUND if shape.kind == "half_space" else color
     if len(dims) == 3:
         points = surface(shape)
         faces = points[ConvexHull(points).simplices]
-        axes.add_collection3d(Poly3DCollection(faces, facecolor=COLOR, edgecolor="none", alpha=0.35))
-    else:
-        axes.fill(*outline(shape, dims).T, facecolor=COLOR, edgecolor="none", alpha=0.35, zorder=1)
+        axes.add_collection3d(Poly3DCollection(faces, facecolor=color, edgecolor="none", alpha=0.35))
+    elif not below(shape, dims):
+        axes.fill(*outline(shape, dims).T, facecolor=color, edgecolor="none", alpha=0.35, zorder=1)
+
+
+def below(shape: Shape, dims: Any = (0, 1)) -> bool:
+    """Whether it is a half space with all the view of the coordinates `dims` above it or below."""
+    normal = shape.placed(np.array([[0.0, 0.0, 1.0]]))[0] - shape.position
+    return shape.kind == "half_space" and bool(np.abs(normal[list(dims)]).max() < 1e-9)

@@ -14,13 +14,16 @@ from matplotlib.ticker import MaxNLocator
 
 from pipeline.artifacts.figures import solids
 from pipeline.artifacts.figures.panels import EVENT, INK, PALE, PATH, new_figure, shape_of, thin, tidy
-from pipeline.artifacts.scene import outlines
+from pipeline.artifacts.scene import around, carried, outlines
 from pipeline.evaluation.evaluation import Evaluation
+from pipeline.model.arm import Arm
 from pipeline.model.task import AXES
 from pipeline.problem.problem import Problem
+from pipeline.robot.shapes import Shape
 from pipeline.studies import style
 
 POSES = 18  # of one stroboscopic view
+TOOLS = 4  # poses in which what the end effector carries is drawn
 
 
 TIME_RAMP = LinearSegmentedColormap.from_list("time", ["#CBDCEE", "#6A9BCB", "#12304F"])
@@ -37,7 +40,10 @@ def stroboscopic(problem: Problem, evaluations: Sequence[Evaluation], name: str)
     planar = size.min() < 1e-6 * size.max()
     dims = np.delete(np.arange(3), np.argmin(size)) if planar else np.arange(3)
     margin = 0.06 * size.max()
-    obstacles = problem.obstacles.shapes if problem.obstacles is not None else ()
+    tools = [_tools(arm, e) for e in evaluations]
+    points = np.concatenate([points, *(solids.surface(shape) for held in tools for shape in held)])
+    low, high = np.nanmin(points, axis=0), np.nanmax(points, axis=0)
+    obstacles = around(problem, points)
     for shape in obstacles:
         corners = solids.surface(shape)
         low, high = np.minimum(low, corners.min(axis=0)), np.maximum(high, corners.max(axis=0))
@@ -64,6 +70,8 @@ def stroboscopic(problem: Problem, evaluations: Sequence[Evaluation], name: str)
             axes.plot(*e.skeleton[k][:, dims].T, "o-", color=shade, linewidth=1.7, markersize=2.8, zorder=2 + usable)
             for edge in edges[i : i + 1]:
                 axes.plot(*edge[k][:, dims].T, color=shade, linewidth=1.2, zorder=1.5 + usable)
+        for held in tools[i]:
+            solids.draw(axes, held, dims, to_hex(TIME_RAMP(0.5)))
         axes.plot(*e.position[thin(e.time)][:, dims].T, color=PATH, linewidth=1.4, zorder=4)
         axes.plot(*e.skeleton[0, :1, dims], "s", color=INK, markersize=8, zorder=5)
         if event is not None:
@@ -92,5 +100,15 @@ def stroboscopic(problem: Problem, evaluations: Sequence[Evaluation], name: str)
         ring = Line2D([], [], color=EVENT, marker="o", linestyle="", fillstyle="none", markersize=9)
         ring.set_label("Singularity; poses after it in grey")
         entries.append(ring)
+    if any(tools):
+        entries.append(Line2D([], [], marker="s", linestyle="", color=to_hex(TIME_RAMP(0.5)), alpha=0.5, label="Tool"))
     figure.legend(handles=entries, loc="outside lower center", ncols=2 if columns == 1 else len(entries), frameon=False)
     return figure
+
+
+def _tools(arm: Arm, e: Evaluation) -> list[Shape]:
+    """What the end effector carries, in the world, in poses equally spaced in time."""
+    if not arm.description.tool:
+        return []
+    moments = np.searchsorted(e.time, np.linspace(e.time[0], e.time[-1], TOOLS) - 1e-9)
+    return carried(arm, e, np.unique(moments))

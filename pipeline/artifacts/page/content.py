@@ -10,11 +10,11 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from pipeline.artifacts.bands import Band, bands
+from pipeline.artifacts.figures.solids import surface
 from pipeline.artifacts.report import Report
-from pipeline.artifacts.scene import corners, path_in_world
+from pipeline.artifacts.scene import around, corners, hull, path_in_world, tool_poses
 from pipeline.artifacts.table import rows
 from pipeline.artifacts.verdict import first, verdict, weighs
 from pipeline.common.arrays import Array
@@ -34,6 +34,7 @@ def run(report: Report) -> dict[str, Any]:
     problem, config = motions.problem, motions.config
     arm = problem.task.arm
     own = [e for e in motions.evaluations if e.solution.found]
+    points = np.concatenate([path_in_world(problem), *(e.skeleton.reshape(-1, 3) for e in own)])
     opens, table = first(report), rows(report)
     shown = {e.label for e in report.shown}
     return {
@@ -46,7 +47,8 @@ def run(report: Report) -> dict[str, Any]:
         "margin": None if problem.obstacles is None else problem.obstacles.margin,
         "foot": None if arm.base.count else list(arm.mounting.base_position),
         "path": packed(path_in_world(problem)),
-        "obstacles": [] if problem.obstacles is None else [_solid(shape) for shape in problem.obstacles.shapes],
+        "obstacles": [_solid(shape) for shape in around(problem, points)],
+        "tool": [_solid(shape) for shape in arm.description.attached],
         "flat": _flat(problem, own),
         "table": table,
         "motions": [_motion(problem, e, e.label in shown, opens is e) for e in own],
@@ -73,6 +75,7 @@ def _band(band: Band) -> dict[str, Any]:
 
 def _motion(problem: Problem, e: Evaluation, shown: bool, opens: bool) -> dict[str, Any]:
     """Its numbers at no more than KNOTS knots: joint values knot by knot, points (n + 1, 3) knot by knot."""
+    arm = problem.task.arm
     keep = np.linspace(0, len(e.time) - 1, min(len(e.time), KNOTS)).round().astype(int)
     lines = {
         "kinetic energy": e.kinetic_energy,
@@ -82,7 +85,7 @@ def _motion(problem: Problem, e: Evaluation, shown: bool, opens: bool) -> dict[s
     }
     if problem.obstacles is not None:
         lines["clearance"] = e.clearance
-    if problem.task.arm.base.kind == "floating":
+    if arm.base.kind == "floating":
         lines["turn of the base"] = e.base.turn
         lines["base-rotation integral"] = e.integrals["base_rotation"]
     return {
@@ -97,8 +100,15 @@ def _motion(problem: Problem, e: Evaluation, shown: bool, opens: bool) -> dict[s
         "joints": {band.kind: packed(band.values(e)[keep]) for band in bands(problem)},
         "lines": {name: packed(values[keep]) for name, values in lines.items()},
         "points": packed(e.skeleton[keep]),
-        "box": packed(corners(problem.task.arm, e.base)[keep]) if problem.task.arm.base.count else None,
+        "box": packed(corners(arm, e.base)[keep]) if arm.base.count else None,
+        "frame": packed(_frame(tool_poses(arm, e, keep))) if arm.description.attached else None,
     }
+
+
+def _frame(poses: tuple[Array, Array]) -> Array:
+    """The origin of frames and their unit points along x, y and z: (K, 4, 3) [m]."""
+    rotation, position = poses
+    return position[:, None] + np.concatenate([np.zeros((len(position), 1, 3)), rotation.swapaxes(1, 2)], axis=1)
 
 
 def _flat(problem: Problem, evaluations: Sequence[Evaluation]) -> int | None:
@@ -109,14 +119,13 @@ def _flat(problem: Problem, evaluations: Sequence[Evaluation]) -> int | None:
 
 
 def _solid(shape: Shape) -> dict[str, Any]:
-    """A ball or a rod by its ends and radius, anything else by its corners."""
-    turn, middle = Rotation.from_rotvec(shape.rotation), np.array(shape.position)
-    if shape.kind == "box":
-        own = np.stack(np.meshgrid(*[(-0.5, 0.5)] * 3, indexing="ij"), axis=-1).reshape(-1, 3) * np.array(shape.size)
-        return {"name": shape.name, "corners": (middle + turn.apply(own)).tolist()}
-    half = np.array([0.0, 0.0, shape.size[1] / 2 if shape.kind == "capsule" else 0.0])
-    ends = [(middle + turn.apply(sign * half)).tolist() for sign in (-1, 1)]
-    return {"name": shape.name, "ends": ends, "radius": shape.size[0]}
+    """A ball or a rod by its ends and radius, anything else by its corners and faces."""
+    if shape.kind in ("sphere", "capsule"):
+        half = np.array([0.0, 0.0, shape.size[1] / 2 if shape.kind == "capsule" else 0.0])
+        return {"name": shape.name, "ends": shape.placed(np.array([-half, half])).tolist(), "radius": shape.size[0]}
+    corners = surface(shape)
+    ground = {"ground": True} if shape.kind == "half_space" else {}
+    return {"name": shape.name, "corners": corners.tolist(), "faces": hull(corners), **ground}
 
 
 def _plane(report: Report, evaluations: Sequence[Evaluation]) -> dict[str, Any] | None:

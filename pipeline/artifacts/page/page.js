@@ -9,7 +9,7 @@
     run.motions.forEach((m) => {
       m.run = number;
       m.name = runs.length > 1 ? `${run.name}: ${m.label}` : m.label;
-      ["time", "points", "box"].forEach((key) => {
+      ["time", "points", "box", "frame"].forEach((key) => {
         if (m[key]) m[key] = floats(m[key]);
       });
       [m.joints, m.lines].forEach((own) =>

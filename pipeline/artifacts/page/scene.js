@@ -14,6 +14,7 @@ function makeScene(canvas, runs, motions) {
   const INK = "#1a202c",
     PATH = "#b83280",
     SOLID = "#c8463c",
+    GROUND = "#8a8f98",
     POSES = 14;
   const { middle, size, low, span } = extent(),
     tile = 10 ** Math.floor(Math.log10(size / 2)) / 2; // [m] of the floor
@@ -140,14 +141,15 @@ function makeScene(canvas, runs, motions) {
       if (seen.has(i)) line(triples(run.path), PATH, 2.2 * thick, 0.22);
     });
     const items = [];
-    const solid = (depth, paint) => items.push({ depth, paint });
+    const solid = (depth, paint) => items.push({ depth, paint }),
+      under = (_, paint) => solid(-1e9, paint);
     runs.forEach((run, i) => {
       if (!seen.has(i)) return;
       run.obstacles.forEach((o) => {
         if (o.ends) {
           const [a, b] = o.ends.map(project);
           solid((a.depth + b.depth) / 2, () => line(o.ends, SOLID, 2 * o.radius * a.scale, 0.45));
-        } else box(o.corners, SOLID, 0.35, solid, pen);
+        } else box(o.corners, o.ground ? GROUND : SOLID, o.ground ? 0.18 : 0.35, o.ground ? under : solid, pen, o.faces);
       });
     });
     shown.forEach((m) => {
@@ -167,6 +169,7 @@ function makeScene(canvas, runs, motions) {
       const color = gone ? "#a0a8b4" : m.color,
         points = pose(m, time);
       if (m.box) box(pose(m, time, m.box), color, 0.25, solid, pen);
+      if (m.frame) carried(runs[m.run].tool, pose(m, time, m.frame), color, solid, pen, line);
       for (let i = 0; i + 1 < points.length; i += 1) {
         const pair = [points[i], points[i + 1]];
         if (!pair.flat().every(Number.isFinite)) continue;
@@ -183,6 +186,17 @@ function makeScene(canvas, runs, motions) {
     items.sort((a, b) => a.depth - b.depth).forEach((item) => item.paint());
   }
 
+  // What the end effector carries, in its frame (origin, and a metre along x, y and z from there).
+  function carried(tool, [origin, ...axes], color, solid, pen, line) {
+    const placed = (p) => origin.map((v, c) => v + axes.reduce((sum, axis, i) => sum + p[i] * (axis[c] - v), 0));
+    tool.forEach((o) => {
+      if (!o.ends) return box(o.corners.map(placed), color, 0.3, solid, pen, o.faces);
+      const ends = o.ends.map(placed),
+        [a, b] = ends.map(project);
+      solid((a.depth + b.depth) / 2, () => line(ends, color, 2 * o.radius * a.scale, 0.35));
+    });
+  }
+
   function dot(pen, at, radius, fill, edge) {
     pen.fillStyle = fill;
     pen.strokeStyle = edge;
@@ -193,12 +207,12 @@ function makeScene(canvas, runs, motions) {
     pen.stroke();
   }
 
-  function box(corners, color, alpha, solid, pen) {
+  function box(corners, color, alpha, solid, pen, faces = FACES) {
     if (!corners.flat().every(Number.isFinite)) return;
     const flatCorners = corners.map(project);
-    FACES.forEach((face) => {
+    faces.forEach((face) => {
       const own = face.map((i) => flatCorners[i]);
-      solid(own.reduce((sum, p) => sum + p.depth, 0) / 4, () => {
+      solid(own.reduce((sum, p) => sum + p.depth, 0) / own.length, () => {
         pen.globalAlpha = alpha;
         pen.fillStyle = color;
         pen.strokeStyle = color;
@@ -207,7 +221,7 @@ function makeScene(canvas, runs, motions) {
         own.forEach((p, i) => (i ? pen.lineTo(p.x, p.y) : pen.moveTo(p.x, p.y)));
         pen.closePath();
         pen.fill();
-        pen.globalAlpha = Math.min(1, 2 * alpha);
+        pen.globalAlpha = faces.length > 6 ? alpha / 2 : Math.min(1, 2 * alpha); // many edges would hide the faces
         pen.stroke();
         pen.globalAlpha = 1;
       });

@@ -16,16 +16,15 @@ import numpy as np
 import pyarrow as pa
 import rerun as rr
 from rerun.chunk import RrdReader
-from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
-from pipeline.artifacts.figures.solids import outline, surface
 from pipeline.artifacts.recording import blueprint, bounds
 from pipeline.artifacts.recording.arm import columns, draw_arm
 from pipeline.artifacts.recording.blueprint import faded, pixels, rgba, slug
+from pipeline.artifacts.recording.solids import send_obstacles, send_tool
 from pipeline.artifacts.recording.stream import record
 from pipeline.artifacts.report import Report
-from pipeline.artifacts.scene import box, corners, outlines, path_in_world
+from pipeline.artifacts.scene import around, box, corners, outlines, path_in_world, tool_poses
 from pipeline.artifacts.summary import text
 from pipeline.artifacts.verdict import first
 from pipeline.common.arrays import Array
@@ -33,14 +32,12 @@ from pipeline.evaluation.evaluation import Evaluation
 from pipeline.model.arm import Arm
 from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Status
-from pipeline.robot.shapes import Shape
 from pipeline.studies import style
 
 POSES = 12  # of the stroboscopic picture
 SOLID = 110  # opacity of the arms, of 255: those behind must shine through
 GHOST = 0.35  # how much of its colour and opacity is left of a motion that is not looked at first
 REFERENCE = (226, 170, 203)  # the colour that paths have in every picture, mixed with white
-OBSTACLE = (200, 70, 60, 255)
 
 
 def write(report: Report, folder: Path) -> None:
@@ -86,13 +83,14 @@ def save(
             recording.log("picture", rr.EncodedImage(path=picture), static=True)
         _send_reference(recording, problem)
         if problem.obstacles is not None:
-            send_obstacles(recording, problem.obstacles.shapes, _planar(problem))
+            points = np.concatenate([path_in_world(problem), *(e.skeleton.reshape(-1, 3) for e in evaluations)])
+            send_obstacles(recording, around(problem, points), _planar(problem))
         for evaluation in evaluations:
             _send_series(recording, problem, evaluation)
             _send_motion(recording, problem, evaluation, GHOST if opens not in ("", evaluation.label) else 1.0)
         bounds.send(recording, problem, evaluations)
 
-    record(file, _layout(problem, evaluations, picture, opens), fill)
+    record(file, name, _layout(problem, evaluations, picture, opens), fill)
 
 
 def read_series(file: Path, entity: str) -> tuple[Array, Array]:
@@ -282,38 +280,9 @@ def _send_arm(
     poses = (evaluation.base.position[rows], evaluation.base.rotation[rows]) if moving else None
     arm, root = problem.task.arm, slug(evaluation.label)
     draw_arm(recording, arm, root, rgba(evaluation.label, opacity), time, q, poses)
+    send_tool(recording, arm, root, rgba(evaluation.label, opacity), time, tool_poses(arm, evaluation, rows))
     if moving and arm.base.spacecraft.mass > 0:
         _send_spacecraft(recording, arm, root, rgba(evaluation.label, opacity))
-
-
-def send_obstacles(recording: Any, shapes: Sequence[Shape], planar: bool) -> None:
-    """Solids that stand in the world, and for the view from above their outlines."""
-    for shape in shapes:
-        if planar:
-            edge = _flat(outline(shape))
-            line = rr.LineStrips2D([[*edge, edge[0]]], colors=OBSTACLE, radii=pixels(2.0), draw_order=15.0)
-            recording.log(f"planar/obstacles/{slug(shape.name)}", line, static=True)
-        common: dict[str, Any] = {"colors": [OBSTACLE], "fill_mode": "solid"}
-        place = {"quaternions": [Rotation.from_rotvec(shape.rotation).as_quat()]}
-        if shape.kind == "capsule":
-            radius, length = shape.size
-            # Rerun's capsules start at their origin: moved back by half their length.
-            axis = Rotation.from_rotvec(shape.rotation).apply([0.0, 0.0, length / 2])
-            solid: Any = rr.Capsules3D(
-                lengths=[length], radii=[radius], translations=[shape.position - axis], **place, **common
-            )
-        elif shape.kind == "cylinder":
-            sizes = {"lengths": [shape.size[1]], "radii": [shape.size[0]]}
-            solid = rr.Cylinders3D(**sizes, centers=[shape.position], **place, **common)
-        elif shape.kind == "mesh":
-            points = surface(shape)
-            faces = ConvexHull(points).simplices
-            solid = rr.Mesh3D(vertex_positions=points, triangle_indices=faces, albedo_factor=OBSTACLE)
-        elif shape.kind == "sphere":
-            solid = rr.Ellipsoids3D(radii=[shape.size[0]], centers=[shape.position], **common)
-        else:
-            solid = rr.Boxes3D(sizes=[shape.size], centers=[shape.position], **place, **common)
-        recording.log(f"obstacles/{slug(shape.name)}", solid, static=True)
 
 
 def _send_spacecraft(recording: Any, arm: Arm, root: str, color: tuple[int, ...]) -> None:

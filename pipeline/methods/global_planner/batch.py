@@ -27,6 +27,7 @@ from pipeline.methods.global_planner.optimum import (
 )
 from pipeline.problem.costs import objective_values
 from pipeline.problem.problem import Problem
+from pipeline.problem.resolution import path_error
 from pipeline.program.confirm import Confirm
 from pipeline.program.newton.newton import COLD, WARM, Barrier, Newton
 from pipeline.program.newton.serve import Solver, why_not
@@ -34,6 +35,7 @@ from pipeline.program.newton.serve import Solver, why_not
 ON_PATH = 1e-8  # [m, rad] at every knot
 JUMPS = 0.1  # of the path's length: an optimum that leaves it so far between coarse knots is not refined
 NEARER = 0.5  # times as far off its path a motion is on twice as many knots; others are by a tenth
+OWN = 2.0  # times as far off the path as the path's own spline on the same knots: the knots are too few, nothing jumps
 SMOOTH = 0.003  # of the path's length: an optimum that leaves it farther and is lost on a finer grid has jumped
 
 
@@ -142,14 +144,12 @@ class Batch:
         """Whether an optimum was one of its coarse knots alone: finer ones lose it, make it dear, or leave it as far
         off its path between them.
         """
-        times, finer = fine
+        (times, finer), before = fine, strays(self.problem, coarse[0], coarse[1].q)
+        reference = self.problem.reference
         if finer is None:
-            return not stays_on_path(self.problem, coarse[0], coarse[1].q, SMOOTH)
-        off = strays(self.problem, times, finer.q)
-        follows = off <= self.problem.reference.tolerance or off <= NEARER * strays(
-            self.problem, coarse[0], coarse[1].q
-        )
-        return finer.cost > STRAYED * coarse[1].cost or not follows
+            return before > max(SMOOTH * reference.geometry.length, OWN * path_error(self.problem, coarse[0])[0])
+        follows = max(reference.tolerance, NEARER * before, OWN * path_error(self.problem, times)[0])
+        return finer.cost > STRAYED * coarse[1].cost or strays(self.problem, times, finer.q) > follows
 
     def _whether_continuous(self, times: Array, optimum: Optimum, share: float) -> Optimum:
         return replace(optimum, continuous=stays_on_path(self.problem, times, optimum.q, share))

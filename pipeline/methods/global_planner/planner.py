@@ -15,19 +15,18 @@ from scipy.interpolate import CubicSpline
 
 from pipeline.common.arrays import Array
 from pipeline.config.methods import GlobalOptions
-from pipeline.methods.global_planner.apart import apart, keeps_own, without_own
-from pipeline.methods.global_planner.basins import Basins, basins, ceiling
+from pipeline.methods.global_planner import reasons
+from pipeline.methods.global_planner.apart import AGAIN, FEW, LOST, apart, blamed, keeps_own, without_own
+from pipeline.methods.global_planner.basins import Basins, basins, ceiling, nearest
 from pipeline.methods.global_planner.batch import JUMPS, Batch
 from pipeline.methods.global_planner.grids import coarsest, finer, on_knots, refinement, served
 from pipeline.methods.global_planner.optimum import Optimum, go_on, optimise_start, refine
 from pipeline.methods.global_planner.ranking import in_order
-from pipeline.methods.global_planner.reasons import counted, no_feasible, no_optimum, no_start
 from pipeline.methods.global_planner.smooth import exactly, freer, nothing, rough, smooth, splined, unserved
 from pipeline.methods.global_planner.starts import Known, Starts
 from pipeline.methods.global_planner.timed import timed
 from pipeline.methods.global_planner.tube import loosened
 from pipeline.methods.method import ALONG_LOOPS, WITH_TIMING, Context, Method
-from pipeline.model.kinematics import wrap
 from pipeline.problem.limits import LIMIT_KINDS
 from pipeline.problem.problem import Problem
 from pipeline.problem.resolution import MOST
@@ -52,7 +51,7 @@ def solve(problem: Problem, options: GlobalOptions, context: Context, known: Kno
         return loosened(problem, by_differences(exactly(problem), options, context), options, context)
     first = (freer if problem.free_timing else rough)(problem)
     found = by_differences(first, options, context, known)
-    if not found[0].found and first.constrained and not problem.free_timing:
+    if not found[0].found and first.constrained and not problem.free_timing and LOST not in found[0].statistics:
         again = by_differences(freer(problem), options, context, known)
         found = max(found, again, key=lambda motions: motions[0].found)
     if found[0].found:  # on the knots that the path needs
@@ -63,28 +62,35 @@ def solve(problem: Problem, options: GlobalOptions, context: Context, known: Kno
 
 
 def by_differences(
-    problem: Problem, options: GlobalOptions, context: Context, known: Known | None = None, lazy: bool = True
+    problem: Problem, options: GlobalOptions, context: Context, known: Known | None = None
 ) -> list[Solution]:
     """The same on the knots alone, as the papers have it.
 
-    lazy: of the arm itself only the starts keep clear; of the optima those that come too near to it are solved again,
-    and where none of them is left, all is.
+    Of the arm itself only the starts keep clear; of the optima those that come too near to it are solved again. Where
+    none of them is left, all is.
     """
-    given, lazy = problem, lazy and keeps_own(problem)
-    why = Batch.without(without_own(problem) if lazy else problem, options)
+    return _searched(problem, without_own(problem) if keeps_own(problem) else problem, options, context, known)
+
+
+def _searched(
+    given: Problem, problem: Problem, options: GlobalOptions, context: Context, known: Known | None
+) -> list[Solution]:
+    """The optima of `problem` from starts of the given one, then solved as that; where all are lost, of that alone."""
+    posed, afterwards = given, given is not problem
+    why = Batch.without(problem, options)
     times, too_coarse = on_knots(problem, options.refine_to)
     if too_coarse:
         return [nothing(problem, Status.NOT_CONVERGED, too_coarse, {})]
-    asked, problem = len(problem.times) - 1, replace(problem, times=times)
+    asked = len(problem.times) - 1
+    given, problem = replace(given, times=times), replace(problem, times=times)
     shape = coarsest(problem, options.coarse_steps, STEPS if why is None else STEPS_ALONE)
     grids = refinement(times, shape, shape if options.coarse_steps is None else 2)
     context.phase("drawing starts")
-    drawn = Starts(problem, grids[0], options, np.random.default_rng(context.seed), known)
+    drawn = Starts(given, grids[0], options, np.random.default_rng(context.seed), known)
     motions, log = drawn.first, drawn.log
-    if lazy:
-        problem = without_own(problem)
     if not len(motions):
-        return [nothing(problem, Status.INFEASIBLE, no_start(problem, log.get("drawn", 0)), log)]
+        why_none = log.get("barred") or reasons.no_start(problem, log.get("drawn", 0))
+        return [nothing(problem, Status.INFEASIBLE, why_none, log)]
 
     batch = Batch(problem, options) if why is None else None
     context.phase(f"solving them on {len(grids[0]) - 1} intervals")
@@ -93,13 +99,15 @@ def by_differences(
         starts = _optimise_starts(problem, grids[0], options, motions, batch, context)
         if any(start.converged for start in starts):
             break
+        if grids[0] is drawn.grid and (barred := reasons.no_place(problem, grids[0])):
+            return [nothing(problem, Status.INFEASIBLE, barred, log)]
         relaxed = _relaxed(problem, grids[0], motions)
         if relaxed is not None and relaxed.feasible:
             starts += context.workers.map(optimise_start, (problem, grids[0], options), [relaxed.q])
             if starts[-1].converged:
                 break
         elif relaxed is not None and (relaxed.worst.relative > HOPELESS or len(grids) == 1):
-            return [nothing(problem, Status.INFEASIBLE, no_feasible(len(motions), relaxed), log)]
+            return [nothing(problem, Status.INFEASIBLE, reasons.no_feasible(len(motions), relaxed), log)]
         if len(grids) == 1:
             break
         # A coarse grid can be infeasible where a finer one is not: its finite differences are other numbers.
@@ -115,8 +123,9 @@ def by_differences(
     log["barren_starts"] = coarse.barren
     context.phase("refining and confirming")
     before, refined = (problem, grids), list[Optimum]()
-    while len(refined) < len(coarse.optima) and not any(map(_good, refined)):
-        lot = coarse.optima[len(refined) : len(refined) + served(before[0])]
+    most = FEW if keeps_own(problem) else len(coarse.optima)
+    while len(refined) < min(most, len(coarse.optima)) and not any(map(_good, refined)):
+        lot = coarse.optima[len(refined) : min(most, len(refined) + served(before[0]))]
         problem, grids, fine_ones = _to_the_end(*before, options, lot, batch, context)
         refined += fine_ones
     log["grids"] = [len(grid) - 1 for grid in grids]
@@ -126,22 +135,24 @@ def by_differences(
         best = min((fine.cost for fine, _ in found), default=np.inf)
         sent = [pair for pair in found if pair[0].cost == best or finer(problem, MOST, [pair[0].q]) is None]
         log["optima_off_path"], found = len(found) - len(sent), sent
-    clear = apart(replace(given, times=problem.times), [fine for fine, _ in found], options, context) if lazy else []
-    if lazy and found:
+    if afterwards and found:
+        problem, near = replace(given, times=problem.times), [fine for fine, _ in found]
+        clear = apart(problem, near, options, context)
         found = [(fine, members) for fine, (_, members) in zip(clear, found, strict=True) if _good(fine)]
         if not found:
-            return by_differences(given, options, context, known, lazy=False)
-        problem = replace(given, times=problem.times)
+            context.phase("keeping the arm off itself")
+            options = replace(options, max_iterations=min(options.max_iterations, AGAIN))
+            return blamed(problem, near, _searched(posed, posed, options, context, known))
     log["jumping_optima"] = coarse.jumping + sum(fine.converged and not fine.continuous for fine in refined)
     if not found:
-        why_not = no_optimum(problem, grids[0], starts, refined, coarse.jumping)
+        why_not = reasons.no_optimum(problem, grids[0], starts, refined, coarse.jumping)
         return [nothing(problem, Status.NOT_CONVERGED, why_not, log)]
     members = {id(fine): count for fine, count in found}
     ranked = in_order(problem, basins(problem, problem.times, [fine for fine, _ in found], options.same_path).optima)
-    words = counted(len(ranked), len(starts), coarse.barren, left)
+    words = reasons.counted(len(ranked), len(starts), coarse.barren, left)
     solutions = []
     for rank, (fine, moved) in enumerate(ranked):
-        said = _said(problem, asked, options, [fine.q]) if rank == 0 else ""
+        said = reasons.on_how_many(problem, asked, options, [fine.q]) if rank == 0 else ""
         own = {"starts_in_basin": members[id(fine)], **(log if rank == 0 else {})}
         solution = as_solution(problem, fine, options)
         solutions.append(
@@ -172,28 +183,36 @@ def as_solution(problem: Problem, optimum: Optimum, options: GlobalOptions) -> S
 
 
 def finish(
-    problem: Problem, times: Array, motions: Array, options: GlobalOptions, context: Context, lazy: bool = True
+    problem: Problem, times: Array, motions: Array, options: GlobalOptions, context: Context
 ) -> tuple[Array, list[Optimum]]:
     """The distinct optima, best first, to which motions (S, N + 1, n) on the knots `times` lead, and the knots that
-    they are on: the problem's, or those that its path needs. Motions that are lost on the way are left out. lazy: see
-    `by_differences`.
+    they are on: the problem's, or those that its path needs. Motions that are lost on the way are left out. Of the arm
+    itself they are kept clear as `by_differences` does.
     """
+    if not keeps_own(problem):
+        return _finished(problem, times, motions, options, context)
+    knots, good = _finished(without_own(problem), times, motions, options, context)
+    if good:
+        given = replace(problem, times=knots)
+        good = [optimum for optimum in apart(given, good, options, context) if _good(optimum)]
+        if not good:
+            return _finished(problem, times, motions, options, context)
+    return knots, basins(problem, knots, good, options.same_path).optima
+
+
+def _finished(
+    problem: Problem, times: Array, motions: Array, options: GlobalOptions, context: Context
+) -> tuple[Array, list[Optimum]]:
     knots, too_coarse = on_knots(problem, options.refine_to)
     if too_coarse:
         return knots, []
-    given, lazy = problem, lazy and keeps_own(problem)
-    problem = replace(without_own(problem) if lazy else problem, times=knots)
+    problem = replace(problem, times=knots)
     batch = Batch(problem, options) if Batch.without(problem, options) is None else None
     grids = [times, *(grid for grid in refinement(knots, len(times)) if len(grid) > len(times))]
     starts = _optimise_starts(problem, times, options, motions, batch, context)
     chosen = basins(problem, times, starts, options.same_path).optima
     problem, _, refined = _to_the_end(problem, grids, options, chosen, batch, context)
     good = [optimum for optimum in refined if _good(optimum)]
-    if lazy and good:
-        problem = replace(given, times=problem.times)
-        good = [optimum for optimum in apart(problem, good, options, context) if _good(optimum)]
-        if not good:
-            return finish(given, times, motions, options, context, lazy=False)
     return problem.times, basins(problem, problem.times, good, options.same_path).optima
 
 
@@ -219,14 +238,6 @@ def _cheapest(optima: list[Optimum]) -> list[Array]:
     """The motion of the best, if there is one."""
     good = [optimum for optimum in optima if _good(optimum)]
     return [min(good, key=lambda optimum: optimum.cost).q] if good else []
-
-
-def _said(problem: Problem, asked: int, options: GlobalOptions, motions: list[Array]) -> str:
-    """That the grid is not the one that was asked for, and not the one that would do."""
-    count = len(problem.times) - 1
-    said = f"on {count} intervals: the {asked} of timing.steps are too few for path.tolerance" * (count > asked)
-    more = options.refine_to is not None and finer(problem, MOST, motions) is not None
-    return "; ".join(filter(None, [said, f"method.global.refine_to = {options.refine_to} allows no more" * more]))
 
 
 def _draw_on(
@@ -287,13 +298,7 @@ def _optimise_starts(
     further = [next(others) if optimum is None else optimum for optimum in served]
     for count, optimum in enumerate(filter(None, served), len(left) + 1):
         done(count, optimum)
-    return [further[_nearest(problem, first, chosen)] if first.converged else first for first in firsts]
-
-
-def _nearest(problem: Problem, optimum: Optimum, others: list[Optimum]) -> int:
-    """Which of the others' motions is nearest."""
-    apart = wrap(np.array([other.q for other in others]) - optimum.q, problem.task.arm.description.revolute)
-    return int(np.abs(apart).max(axis=(1, 2)).argmin())
+    return [further[nearest(problem, first, chosen)] if first.converged else first for first in firsts]
 
 
 def _refine_all(

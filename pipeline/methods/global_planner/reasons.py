@@ -9,14 +9,21 @@ from collections import Counter
 import numpy as np
 
 from pipeline.common.arrays import Array
+from pipeline.config.methods import GlobalOptions
+from pipeline.evaluation.certified import Closest, said
+from pipeline.methods.global_planner.grids import finer
 from pipeline.methods.global_planner.optimum import Optimum
 from pipeline.model.kinematics import ATTEMPTS, reach
 from pipeline.problem.problem import Problem
+from pipeline.problem.resolution import MOST
 from pipeline.program.feasibility import Relaxed, violations
+from pipeline.search.barred import barred
 
 OTHERS = "more starts (method.global.optimised) or other ones (method.global.starts)"
 
 REACHED = 1e-6  # [m, rad]
+
+NODES = 1000  # of the longest self-motion manifold
 
 
 def counted(optima: int, starts: int, barren: int, left: int = 0) -> str:
@@ -28,6 +35,14 @@ def counted(optima: int, starts: int, barren: int, left: int = 0) -> str:
 
 def _named(count: int) -> str:
     return "optimum" if count == 1 else "optima"
+
+
+def on_how_many(problem: Problem, asked: int, options: GlobalOptions, motions: list[Array]) -> str:
+    """That the grid is not the one that was asked for, and not the one that would do."""
+    count = len(problem.times) - 1
+    said = f"on {count} intervals: the {asked} of timing.steps are too few for path.tolerance" * (count > asked)
+    more = options.refine_to is not None and finer(problem, MOST, motions) is not None
+    return "; ".join(filter(None, [said, f"method.global.refine_to = {options.refine_to} allows no more" * more]))
 
 
 def no_start(problem: Problem, drawn: int) -> str:
@@ -48,6 +63,18 @@ def no_start(problem: Problem, drawn: int) -> str:
         f"none of {drawn} motions that were drawn follows the path to its end; try other ones (method.global.starts), "
         "more of them (method.global.candidates), or another robot.q_init: from a singular one many get stuck"
     )
+
+
+def no_place(problem: Problem, times: Array) -> str:
+    """That at some place of the path no configuration is within the position limits, where r = 1 lets that be seen at
+    the knots `times`; else nothing.
+    """
+    bounds = problem.bounds
+    limited = bool(np.isfinite(bounds.lower).any() or np.isfinite(bounds.upper).any())
+    if problem.task.redundancy != 1 or problem.task.arm.base.count or not limited:
+        return ""
+    found = barred(problem, times, NODES)
+    return "" if found is None else found.sentence
 
 
 def no_feasible(starts: int, relaxed: Relaxed) -> str:
@@ -71,6 +98,19 @@ def no_optimum(problem: Problem, grid: Array, starts: list[Optimum], refined: li
     return (
         f"none of {len(starts)} starts converged (most often: {words}){_nearest(problem, grid, starts)}; "
         f"try more iterations (method.global.max_iterations), {OTHERS}"
+    )
+
+
+def too_near(problem: Problem, optima: int, closest: Closest) -> str:
+    """Every optimum comes too near to the arm itself, and none does where it has to keep off: which pair, which key."""
+    own = problem.own
+    assert own is not None
+    lost = "the optimum found comes" if optima == 1 else f"all {optima} optima found come"
+    return (
+        f"{lost} too near to the arm itself ({said(closest)}, collision.margin = {own.margin:.3g} m), and where that "
+        "is kept none was found; if these may come so near, say so: "
+        f"collision.allow=[[{closest.first},{closest.second}]], or by a smaller collision.margin or an SRDF "
+        "(collision.srdf)"
     )
 
 

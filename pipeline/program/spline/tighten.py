@@ -150,7 +150,8 @@ def tighten(
 
     Where a limit is exceeded in an interval its bounds at both knots are divided by that excess and a little more; from
     round to round by more of it, since what lies between two knots may give way by less than they do. Of the shortest
-    motion the time changes with them. begin: where `first` came from, on its knots; what comes too near to something is
+    motion the time changes with them. Limits of torque and power that the first solve left out stay out while they are
+    kept. begin: where `first` came from, on its knots; what comes too near to something is
     solved again from there: from where it touches IPOPT may be long in finding another way round.
     """
     solved, further, tightened = first, [], Tightened.none(problem, first.curve.times)

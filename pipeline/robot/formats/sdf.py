@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from copy import deepcopy
 from pathlib import Path
 from typing import Any
@@ -42,13 +42,9 @@ DEEPEST = 20  # files within files
 def read(root: ET.Element, file: Path, end_effector: str) -> Tree:
     """The model of an <sdf> element that has the link `end_effector`, else its first; raises RobotError, one line."""
     tree = Tree(file.stem, file)
-    tops = [model for scope in (root, *root.findall("world")) for model in scope if model.tag in ("model", "include")]
-    if not tops:
-        raise tree.fail("the root element is <sdf> and holds no <model>; expected one, or <robot> for a URDF")
-    if not root.get("version"):
-        raise tree.fail(f"the element <{root.tag}> states no version; write <{root.tag} version='1.9'>")
     found: dict[str, str] = {}
-    stated = [dict(_scoped(top, file, (), tree, found)) for top in tops]
+    tops = models(root, tree)
+    stated = [{path: element for path, element, _ in scoped(top, file, (), tree, found)} for top in tops]
     wanted = end_effector.rpartition("::")[2]
     chosen = next((i for i, links in enumerate(stated) if any(path[-1] == wanted for path in links)), 0)
     for scope in (root, *root.findall("world")):
@@ -58,10 +54,8 @@ def read(root: ET.Element, file: Path, end_effector: str) -> Tree:
     root = deepcopy(root)
     joints = {path: joint for path, joint in elements.items() if joint.tag == "joint"}
     links = {path: link for path, link in elements.items() if link.tag == "link"}
-    _strip(root)
-    _absolute(root, file, tree)
-    plant, models = drake.made(tree, ET.tostring(root, encoding="unicode"), "sdf", found)
-    top = plant.GetModelInstanceName(models[0])
+    plant, made = placed(root, file, tree, found)
+    top = plant.GetModelInstanceName(made[0])
     tree.name = top
     bodies = [plant.get_body(BodyIndex(index)) for index in range(plant.num_bodies())]
     instances = list(dict.fromkeys(b.model_instance() for b in bodies if b.index() != plant.world_body().index()))
@@ -85,10 +79,28 @@ def read(root: ET.Element, file: Path, end_effector: str) -> Tree:
     return tree
 
 
-def _scoped(
+def models(root: ET.Element, tree: Tree) -> list[ET.Element]:
+    """The models of an <sdf> element and of the worlds in it, and the includes of models; raises RobotError if none."""
+    tops = [model for scope in (root, *root.findall("world")) for model in scope if model.tag in ("model", "include")]
+    if not tops:
+        raise tree.fail("the root element is <sdf> and holds no <model>; expected one, or <robot> for a URDF")
+    if not root.get("version"):
+        raise tree.fail(f"the element <{root.tag}> states no version; write <{root.tag} version='1.9'>")
+    return tops
+
+
+def placed(root: ET.Element, file: Path, tree: Tree, found: Mapping[str, str]) -> tuple[Any, list[Any]]:
+    """Drake's plant of the frames of an <sdf> element, which is stripped of all else, and its models."""
+    _strip(root)
+    _absolute(root, file, tree)
+    return drake.made(tree, ET.tostring(root, encoding="unicode"), "sdf", found)
+
+
+def scoped(
     model: ET.Element, file: Path, scope: tuple[str, ...], tree: Tree, found: dict[str, str], depth: int = 0
-) -> Iterator[tuple[tuple[str, ...], ET.Element]]:
-    """Links and joints as written, by their paths in the top model, those of included files too; their numbers checked.
+) -> Iterator[tuple[tuple[str, ...], ET.Element, Path]]:
+    """Links and joints as written, by their paths in the top model, those of included files too, and the file of each;
+    their numbers checked.
 
     found: gets the folders of the packages that are named.
     """
@@ -101,7 +113,7 @@ def _scoped(
             return
         found |= packages.named_folder(uri, file.parent)
         for element in parse(inner.read_bytes(), inner).findall("model"):
-            yield from _scoped(element, inner, scope, tree, found, depth + 1)
+            yield from scoped(element, inner, scope, tree, found, depth + 1)
         return
     for child in model:
         called = child.get("name", "") or _text(child, "name")
@@ -109,10 +121,10 @@ def _scoped(
             where = f"robot.urdf = {tree.file}: {child.tag} '{child.get('name')}' has"
             _refuse_twice(child, where)
             _check_poses(child, where)
-            yield (*scope, called), child
+            yield (*scope, called), child, file
         elif child.tag in ("model", "include"):
             merged = child.get("merge", "false") in ("true", "1")
-            yield from _scoped(child, file, scope if merged else (*scope, called), tree, found, depth + 1)
+            yield from scoped(child, file, scope if merged else (*scope, called), tree, found, depth + 1)
 
 
 def _strip(element: ET.Element) -> None:
@@ -151,22 +163,23 @@ def _link(element: ET.Element, name: str, tree: Tree) -> Link:
         link.unknown = f"no {named} in its <inertial>, and SDF's default of 1 kg m^2 is nobody's; state it"
     written = {key: "0" if stated.get(key) is None else stated[key] for key in MOMENTS}
     moments = tuple(number(text or "", f"{where} the inertia {key}") for key, text in written.items())
-    place = _pose(inertial.find("pose"), f"{where} in its inertial the pose")
+    place = pose(inertial.find("pose"), f"{where} in its inertial the pose")
     link.inertial = Inertial(0.0 if mass is None else number(mass.text or "", f"{where} the mass"), *place, moments)
     return link
 
 
-def _pose(pose: ET.Element | None, where: str) -> tuple[Vector, Vector]:
-    """xyz [m] and rpy [rad] of a <pose>."""
-    if pose is None or not (pose.text or "").strip(SPACE):
+def pose(element: ET.Element | None, where: str) -> tuple[Vector, Vector]:
+    """xyz [m] and rpy [rad] of a <pose>; raises RobotError, which begins with `where`, for what is none."""
+    text = "" if element is None else element.text or ""
+    if element is None or not text.strip(SPACE):
         return ZERO, ZERO
-    quaternion = pose.get("rotation_format") == "quat_xyzw"
-    values = numbers(pose.text or "", 7 if quaternion else 6, where)
+    quaternion = element.get("rotation_format") == "quat_xyzw"
+    values = numbers(text, 7 if quaternion else 6, where)
     if quaternion:
         if not any(values[3:]):
-            raise RobotError(f"{where} '{shown(pose.text or '')}', expected a quaternion that is not zero")
+            raise RobotError(f"{where} '{shown(text)}', expected a quaternion that is not zero")
         return values[:3], tuple(Rotation.from_quat(values[3:]).as_euler("xyz").tolist())
-    turn = np.deg2rad(values[3:]) if pose.get("degrees") in ("true", "1") else np.array(values[3:])
+    turn = np.deg2rad(values[3:]) if element.get("degrees") in ("true", "1") else np.array(values[3:])
     return values[:3], tuple(turn.tolist())
 
 
@@ -179,7 +192,7 @@ def _refuse_twice(element: ET.Element, where: str) -> None:
 
 def _check_poses(element: ET.Element, where: str) -> None:
     """What Drake is to read of a link or joint: its own pose and its axis."""
-    _pose(element.find("pose"), f"{where} the pose")
+    pose(element.find("pose"), f"{where} the pose")
     for axis in element.findall("axis"):
         text = axis.findtext("xyz")
         if text is not None and element.get("type") != "fixed":
