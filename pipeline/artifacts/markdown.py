@@ -103,7 +103,7 @@ def own_notes(own: Own | None) -> list[str]:
     if own.unknown:
         return [f"- not checked: self-collision ({own.unknown})"]
     named = ", ".join(" - ".join(pair) for pair in own.always)
-    lines = [f"- not checked: {named}, which touch wherever the arm is"] if named else []
+    lines = [f"- not checked: {named}, which are as near to each other wherever the arm is"] if named else []
     if own.allowed:
         lines.append(f"- not checked: {own.allowed} pairs of links that the SRDF or collision.allow let touch")
     return lines

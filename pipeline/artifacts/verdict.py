@@ -39,13 +39,25 @@ def verdict(report: Report) -> str:
         return _pieces(report)
     reasons = f"{_reasons(report, motion)}."
     if exported is not None and exported.faults:
-        return f"Not to be sent, though exported: {called(motion)} {exported.fault}. {_capital(reasons)}"
+        return f"Not to be sent, though exported: {called(motion)} {exported.fault}. {called(motion)}: {reasons}"
     if exported is not None:
-        return f"Send {called(motion)}: {reasons}"
+        return f"Send {called(motion)}: {reasons}{_passed(report, exported)}"
     if refused is not None and refused.refused:
         fault = next(one.fault for one in refused.refused if one.is_of(motion))
-        return f"Nothing to send: {called(motion)}, the best found, {fault}. {refused.instead}{_capital(reasons)}"
+        return (
+            f"Nothing to send: {called(motion)}, the best found, {fault}. {refused.instead}{called(motion)}: {reasons}"
+        )
     return f"Best found: {called(motion)}: {reasons}"
+
+
+def _passed(report: Report, exported: Resampled) -> str:
+    """The best motion, where a dearer one is sent: why not that one, and what to do."""
+    if not exported.before:
+        return ""
+    best = next(e for e in report.motions.evaluations if exported.before[0].is_of(e))
+    sent_one = next(e for e in report.motions.evaluations if exported.is_of(e))
+    less = 100 * saving(report.motions.problem, best, sent_one)
+    return f" {called(best)} would take {less:.2g} % less, but {exported.before[0].fault}. {exported.instead}".rstrip()
 
 
 def _pieces(report: Report) -> str:
@@ -116,26 +128,27 @@ def _reasons(report: Report, e: Evaluation) -> str:
         unchecked.append("obstacles (none given)")
     if not problem.bounds.any:
         unchecked.append("limits (none given)")
-    known = _confirmed(report, e)
+    known, broken = _confirmed(report, e), _singular(report)
     left = f"not checked: {', '.join(unchecked)}" if unchecked else ""
-    return "; ".join(filter(None, [", ".join(parts), known, left]))
+    return "; ".join(filter(None, [", ".join(parts), known, broken, left]))
 
 
 def _against(report: Report, e: Evaluation) -> str:
     other, problem = baseline(report), report.motions.problem
-    if other is None:
-        singular = next((m for m in report.motions.evaluations if m.solution.event_time is not None), None)
-        return (
-            ""
-            if singular is None
-            else f"{METHODS[singular.method].title} is singular at {singular.solution.event_time:.2f} s"
-        )
-    if other is e:
+    if other is None or other is e:
         return ""
     saved, what = saving(problem, e, other), COSTS.get(weighs(problem), f"of the {weighs(problem)} integral")
     share = f"{100 * abs(saved):.2g} % {'less' if saved >= 0 else 'more'} {what} than {METHODS[other.method].title}"
     beyond = exceeded(other)
     return share + (f" (which exceeds {', '.join(beyond)})" if beyond else "")
+
+
+def _singular(report: Report) -> str:
+    """The pseudoinverse's fate, where it leaves nothing to be held against."""
+    broken = next((e for e in report.motions.evaluations if e.solution.event_time is not None), None)
+    if broken is None or baseline(report) is not None:
+        return ""
+    return f"{METHODS[broken.method].title} is singular at {broken.solution.event_time:.2f} s"
 
 
 def _limits(problem: Problem, e: Evaluation) -> str:
@@ -152,7 +165,3 @@ def _confirmed(report: Report, e: Evaluation) -> str:
         if one.same_as == e.solution.optimum and not one.gone_on:
             said.append(f"{one.method.replace('_', ' ')} leads there too")
     return ", ".join(said)
-
-
-def _capital(text: str) -> str:
-    return text[:1].upper() + text[1:]

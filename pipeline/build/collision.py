@@ -21,7 +21,7 @@ from pipeline.robot.touching import Pair, apart, disabled, groups
 
 ANGLES = 128  # of the first joint at which a path is compared with what it carries
 POINTS = 101  # of the path
-SAMPLES = 300  # configurations in each of which a pair touches that counts as one that always does
+SAMPLES = 300  # configurations in each of which a pair is near that counts as one that always is
 
 
 def make_own(collision: CollisionConfig, arm: Arm, srdf: str | None = None) -> Own | None:
@@ -135,22 +135,29 @@ def _allowed(collision: CollisionConfig, arm: Arm, srdf: str | None) -> set[froz
 
 
 def _always(arm: Arm, own: Own) -> set[Pair]:
-    """The pairs that do not keep their margin in any of SAMPLES configurations within the joints' ranges.
+    """The pairs whose gap no motion changes: in SAMPLES configurations within the joints' ranges it is never the
+    margin, or always between three quarters and twice of it, as between the shells of a wrist.
 
     Drake is not asked: capsules of one link that end where those of another begin can keep it searching for ever.
     """
-    description, rng, left = arm.description, np.random.default_rng(0), set(own.pairs)
-    if not left:
-        return left
+    description, rng, margin = arm.description, np.random.default_rng(0), own.margin
+    gaps: dict[Pair, tuple[float, float]] = dict.fromkeys(own.pairs, (np.inf, -np.inf))
+    if not gaps:
+        return set()
     places, solids = Places(arm), solids_of(description)
     low, high = np.maximum(description.lower, -np.pi), np.minimum(description.upper, np.pi)
     for q in rng.uniform(low, np.maximum(low, high), (SAMPLES, arm.n)):
         at = places(q)
-        placed = {link: [solid.moved(*at[link]) for solid in solids[link]] for pair in left for link in pair}
-        left = {pair for pair in left if _near(placed[pair[0]], placed[pair[1]], own.margin)}
-        if not left:
+        placed = {link: [solid.moved(*at[link]) for solid in solids[link]] for pair in gaps for link in pair}
+        for pair, (least, most) in list(gaps.items()):
+            gap = _gap(placed[pair[0]], placed[pair[1]], 2 * margin)
+            least, most = min(least, gap), max(most, gap)
+            gaps[pair] = least, most
+            if most >= margin and (most >= 2 * margin or least < 0.75 * margin):
+                del gaps[pair]
+        if not gaps:
             break
-    return left
+    return set(gaps)
 
 
 def too_near(problem: Problem, q: Array) -> bool:
@@ -168,6 +175,11 @@ def too_near(problem: Problem, q: Array) -> bool:
 
 def _near(first: list[Solid], second: list[Solid], margin: float) -> bool:
     return any(_within(a, b, margin) and distance(a, b)[0] < margin for a in first for b in second)
+
+
+def _gap(first: list[Solid], second: list[Solid], most: float) -> float:
+    """The least distance [m] between them, infinite where the balls around them are farther apart than `most`."""
+    return min((distance(a, b)[0] for a in first for b in second if _within(a, b, most)), default=np.inf)
 
 
 def _within(a: Solid, b: Solid, margin: float) -> bool:

@@ -23,7 +23,8 @@ class Own:
     """Pairs of the arm's links that may not touch, the least distance [m] between them, from how much farther on [m]
     they are felt by the solver, and whether motions have to keep it: if not, it is reported all the same.
 
-    always: pairs that were left out since they touch in every sample; allowed: how many were since they may touch.
+    always: pairs that were left out since no motion parts them or brings them nearer; allowed: how many were since they
+    may touch.
     unknown: why nothing is known of any pair.
     """
 

@@ -12,10 +12,11 @@ from pipeline.common.files import write_beside
 from pipeline.common.markdown import markdown_table
 from pipeline.config.documents import Document
 from pipeline.reproduce.table import counts
-from pipeline.reproduce.verdict import TIMING
+from pipeline.reproduce.verdict import DIFFERS, MISPRINT, TIMING
 
 TIMES = "Computing times, those of the document from its own machine"
 HEAD = ("place", "quantity", "printed", "recomputed", "difference", "verdict", "with printed masses", "note")
+SEVERAL = {MISPRINT: "misprints", DIFFERS: "differ"}
 
 
 def write(folder: Path, documents: Sequence[Document], table: pd.DataFrame) -> None:
@@ -48,7 +49,7 @@ def sentence(table: pd.DataFrame) -> str:
 
 
 def _listed(judged: Mapping[str, int]) -> str:
-    return ", ".join(f"{count} {name}" for name, count in judged.items())
+    return ", ".join(f"{count} {name if count == 1 else SEVERAL.get(name, name)}" for name, count in judged.items())
 
 
 def cells(row: dict[Any, Any]) -> list[str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -32,6 +32,7 @@ class Resampled(Result):
 
     limit_excess: by kind, relative (see evaluation.limit_excess); worst: where each is largest, (time [s], joint).
     faults: why it cannot be sent; none if it can. strays: whether one of them is its distance from the path.
+    before: cheaper motions that cannot be sent; instead: what would make one of them that can, in sentences.
     """
 
     name: ClassVar[str] = "export"
@@ -48,6 +49,8 @@ class Resampled(Result):
     worst: dict[str, tuple[float, str]]
     faults: tuple[str, ...] = ()
     strays: bool = False
+    before: tuple[Resampled, ...] = ()
+    instead: str = ""
 
     def is_of(self, motion: Evaluation) -> bool:
         """Whether these are the samples of that motion."""
@@ -119,7 +122,8 @@ def study(motions: Motions) -> Result | None:
         return None  # pieces are sent with their transits (`pieces.py`)
     sent, refused = _sent(motions)
     if sent is not None:
-        return sent[1]
+        passed = () if sent[1].faults else refused
+        return replace(sent[1], before=passed, instead=instead(motions, passed) if passed else "")
     return Nothing(refused, instead(motions, refused)) if refused or asked == "best" else None
 
 

@@ -110,6 +110,8 @@ def test_the_pictures_and_facts_are_there(case: Case, tmp_path: Path) -> None:
     stored = {key: value[0] for key, value in facts.to_record_batch().to_pydict().items()}
     assert FACTS.items() <= stored.items()
     assert "absent" not in stored
+    (entry,) = RrdReader(file).recordings()
+    assert entry.application_id == "selfmotion line"  # a viewer lays all of one application out as the first of them
     assert component(file, "/summary", "TextDocument:text") == ["# A line\n\nthe text"]
     assert component(file, "/__properties", "RecordingInfo:name") == ["line"]
 

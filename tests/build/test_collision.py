@@ -25,6 +25,9 @@ ARM = """<robot name="a"><link name="base"/>{links}
 LINK = """<link name="{name}"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>
 </inertial><collision><geometry>{solid}</geometry></collision></link>"""
 
+TURNING = '<child link="b"/><axis xyz="0 0 1"/>'
+SLIDING = '<axis xyz="0 0 1"/><limit lower="-{most}" upper="{most}" effort="1" velocity="1"/>'
+
 
 def posed(*words: str) -> Problem:
     return prepare(composed(*PANDA, *words))
@@ -103,6 +106,20 @@ def test_a_missing_mesh_matters_where_it_is_used(tmp_path: Path) -> None:
     assert "link 'c': the mesh" in own.unknown
     with pytest.raises(RobotError, match=r"link 'c': the mesh .*lost\.stl was not found"):
         make_own(CollisionConfig(own=True), arm)
+
+
+def test_pairs_whose_gap_no_motion_changes_are_left_out(tmp_path: Path) -> None:
+    """Balls 8 mm apart that slide by 1 mm are near by their build, where 8 mm are to be kept; by 6 mm they may not."""
+    ball = '<sphere radius="0.196"/>'
+    words = own_arm(tmp_path, a=ball, b='<box size="0.01 0.01 0.01"/>', c=ball)
+    file = Path(words[0].partition("=")[2])
+    turning = file.read_text().replace('<child link="b"/><origin xyz="0 0 0.4"/><axis xyz="0 1 0"/>', TURNING)
+    turning = turning.replace('name="j3" type="continuous"', 'name="j3" type="prismatic"')
+    for slides, margin, left_out in ((0.001, 0.008, True), (0.001, 0.003, False), (0.006, 0.008, False)):
+        file.write_text(turning.replace('<axis xyz="1 0 0"/>', SLIDING.format(most=slides)), encoding="utf-8")
+        own = make_own(CollisionConfig(margin=margin), load(composed(*words).robot))
+        assert own is not None
+        assert (own.always, own.pairs) == (((("a", "c"),), ()) if left_out else ((), (("a", "c"),)))
 
 
 def test_pairs_that_always_touch_are_left_out(tmp_path: Path) -> None:

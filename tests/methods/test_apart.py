@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from pipeline.build.problem import prepare
 from pipeline.evaluation.evaluation import Evaluation, evaluate
+from pipeline.methods.global_planner import planner
 from pipeline.methods.global_planner.planner import global_planner
+from pipeline.methods.method import Context
 from pipeline.problem.solution import Status
 from tests.support import FEW_STARTS, composed
 
 MARGIN = 0.25  # [m] of the last joint from the first: the best motion keeps it by 11 mm, the second falls 1.4 mm short
+SPLINE = "method.global.transcription=spline"
+TOO_WIDE = 0.28  # [m] no start keeps it
 BALL = "[{kind: sphere, radius: 0.02, center: %s}]"
 SHAPES = f"{{base: {BALL % '[0, 0, 0]'}, link2: {BALL % '[0.16, 0, 0]'}}}"
 
@@ -37,3 +43,18 @@ def test_an_optimum_too_near_to_the_arm_is_moved_and_others_stay() -> None:
     assert second.status is Status.SOLVED
     assert MARGIN <= least(second) < MARGIN + 2e-3
     assert 1 < second.energy_integral[-1] / second_without.energy_integral[-1] < 1.1
+
+
+@pytest.mark.slow
+def test_where_all_are_too_near_the_pair_and_the_keys_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Those solved again are lost, and nothing is found that keeps off from the beginning: limits are not to blame."""
+    said: list[str] = []
+    monkeypatch.setattr(planner, "apart", lambda _, found, *__: [replace(one, converged=False) for one in found])
+    monkeypatch.setattr(planner, "freer", lambda _: pytest.fail("other limits were tried"))
+    words = (f"robot.collision={SHAPES}", f"collision.margin={TOO_WIDE}", "collision.self=true", *FEW_STARTS)
+    config = composed("+experiment=traj3", "timing.steps=10", "limits=joint", SPLINE, *words)
+    (one,) = global_planner(prepare(config), config.method.of("global"), Context(phase=said.append))
+    assert not one.found
+    assert "too near to the arm itself (base and link2 are 0.1" in one.message
+    assert "collision.allow=[[base,link2]]" in one.message
+    assert said.count("keeping the arm off itself") == 1

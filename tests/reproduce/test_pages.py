@@ -46,7 +46,7 @@ def test_tables(pages: list[Path]) -> None:
     table = pd.read_csv(pages[0].with_name("reproduction.csv"))
     assert sum(counts(table).values()) == len(table) == 6
     text = pages[0].with_name("reproduction.md").read_text(encoding="utf-8")
-    assert "6 printed numbers: 6 reproduced, 0 better, 0 misprint, 0 differs" in text
+    assert "6 printed numbers: 6 reproduced, 0 better, 0 misprints, 0 differ" in text
     assert "| Figure 3 | case 1, final position error (about) | 0.0026 m | 0.002553 | -1.81 % | reproduced |" in text
 
 

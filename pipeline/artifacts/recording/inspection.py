@@ -56,4 +56,4 @@ def write(file: Path, arm: Arm, time: Array, q: Array, *, name: str) -> None:
         recording.log("joint_position", lines, static=True)
         recording.send_columns("joint_position", columns(time), rr.Scalars.columns(scalars=q))
 
-    record(file, layout, fill)
+    record(file, name, layout, fill)

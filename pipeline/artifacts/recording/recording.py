@@ -90,7 +90,7 @@ def save(
             _send_motion(recording, problem, evaluation, GHOST if opens not in ("", evaluation.label) else 1.0)
         bounds.send(recording, problem, evaluations)
 
-    record(file, _layout(problem, evaluations, picture, opens), fill)
+    record(file, name, _layout(problem, evaluations, picture, opens), fill)
 
 
 def read_series(file: Path, entity: str) -> tuple[Array, Array]:

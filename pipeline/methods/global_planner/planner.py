@@ -16,7 +16,7 @@ from scipy.interpolate import CubicSpline
 from pipeline.common.arrays import Array
 from pipeline.config.methods import GlobalOptions
 from pipeline.methods.global_planner import reasons
-from pipeline.methods.global_planner.apart import apart, keeps_own, without_own
+from pipeline.methods.global_planner.apart import AGAIN, FEW, LOST, apart, blamed, keeps_own, without_own
 from pipeline.methods.global_planner.basins import Basins, basins, ceiling, nearest
 from pipeline.methods.global_planner.batch import JUMPS, Batch
 from pipeline.methods.global_planner.grids import coarsest, finer, on_knots, refinement, served
@@ -51,7 +51,7 @@ def solve(problem: Problem, options: GlobalOptions, context: Context, known: Kno
         return loosened(problem, by_differences(exactly(problem), options, context), options, context)
     first = (freer if problem.free_timing else rough)(problem)
     found = by_differences(first, options, context, known)
-    if not found[0].found and first.constrained and not problem.free_timing:
+    if not found[0].found and first.constrained and not problem.free_timing and LOST not in found[0].statistics:
         again = by_differences(freer(problem), options, context, known)
         found = max(found, again, key=lambda motions: motions[0].found)
     if found[0].found:  # on the knots that the path needs
@@ -69,18 +69,14 @@ def by_differences(
     Of the arm itself only the starts keep clear; of the optima those that come too near to it are solved again. Where
     none of them is left, all is.
     """
-    if keeps_own(problem):
-        found = _searched(problem, without_own(problem), options, context, known)
-        if found is not None:
-            return found
-    return _searched(problem, problem, options, context, known) or []
+    return _searched(problem, without_own(problem) if keeps_own(problem) else problem, options, context, known)
 
 
 def _searched(
     given: Problem, problem: Problem, options: GlobalOptions, context: Context, known: Known | None
-) -> list[Solution] | None:
-    """The optima of `problem` from starts of the given one, then solved as that; None where this loses all of them."""
-    afterwards = given is not problem
+) -> list[Solution]:
+    """The optima of `problem` from starts of the given one, then solved as that; where all are lost, of that alone."""
+    posed, afterwards = given, given is not problem
     why = Batch.without(problem, options)
     times, too_coarse = on_knots(problem, options.refine_to)
     if too_coarse:
@@ -127,8 +123,9 @@ def _searched(
     log["barren_starts"] = coarse.barren
     context.phase("refining and confirming")
     before, refined = (problem, grids), list[Optimum]()
-    while len(refined) < len(coarse.optima) and not any(map(_good, refined)):
-        lot = coarse.optima[len(refined) : len(refined) + served(before[0])]
+    most = FEW if keeps_own(problem) else len(coarse.optima)
+    while len(refined) < min(most, len(coarse.optima)) and not any(map(_good, refined)):
+        lot = coarse.optima[len(refined) : min(most, len(refined) + served(before[0]))]
         problem, grids, fine_ones = _to_the_end(*before, options, lot, batch, context)
         refined += fine_ones
     log["grids"] = [len(grid) - 1 for grid in grids]
@@ -139,11 +136,13 @@ def _searched(
         sent = [pair for pair in found if pair[0].cost == best or finer(problem, MOST, [pair[0].q]) is None]
         log["optima_off_path"], found = len(found) - len(sent), sent
     if afterwards and found:
-        problem = replace(given, times=problem.times)
-        clear = apart(problem, [fine for fine, _ in found], options, context)
+        problem, near = replace(given, times=problem.times), [fine for fine, _ in found]
+        clear = apart(problem, near, options, context)
         found = [(fine, members) for fine, (_, members) in zip(clear, found, strict=True) if _good(fine)]
         if not found:
-            return None
+            context.phase("keeping the arm off itself")
+            options = replace(options, max_iterations=min(options.max_iterations, AGAIN))
+            return blamed(problem, near, _searched(posed, posed, options, context, known))
     log["jumping_optima"] = coarse.jumping + sum(fine.converged and not fine.continuous for fine in refined)
     if not found:
         why_not = reasons.no_optimum(problem, grids[0], starts, refined, coarse.jumping)

@@ -10,6 +10,7 @@ import numpy as np
 
 from pipeline.common.arrays import Array
 from pipeline.config.methods import GlobalOptions
+from pipeline.evaluation.certified import Closest, said
 from pipeline.methods.global_planner.grids import finer
 from pipeline.methods.global_planner.optimum import Optimum
 from pipeline.model.kinematics import ATTEMPTS, reach
@@ -97,6 +98,19 @@ def no_optimum(problem: Problem, grid: Array, starts: list[Optimum], refined: li
     return (
         f"none of {len(starts)} starts converged (most often: {words}){_nearest(problem, grid, starts)}; "
         f"try more iterations (method.global.max_iterations), {OTHERS}"
+    )
+
+
+def too_near(problem: Problem, optima: int, closest: Closest) -> str:
+    """Every optimum comes too near to the arm itself, and none does where it has to keep off: which pair, which key."""
+    own = problem.own
+    assert own is not None
+    lost = "the optimum found comes" if optima == 1 else f"all {optima} optima found come"
+    return (
+        f"{lost} too near to the arm itself ({said(closest)}, collision.margin = {own.margin:.3g} m), and where that "
+        "is kept none was found; if these may come so near, say so: "
+        f"collision.allow=[[{closest.first},{closest.second}]], or by a smaller collision.margin or an SRDF "
+        "(collision.srdf)"
     )
 
 
