@@ -56,8 +56,9 @@ def _passed(report: Report, exported: Resampled) -> str:
         return ""
     best = next(e for e in report.motions.evaluations if exported.before[0].is_of(e))
     sent_one = next(e for e in report.motions.evaluations if exported.is_of(e))
-    less = 100 * saving(report.motions.problem, best, sent_one)
-    return f" {called(best)} would take {less:.2g} % less, but {exported.before[0].fault}. {exported.instead}".rstrip()
+    problem = report.motions.problem
+    less = f"{100 * saving(problem, best, sent_one):.2g} % less {COSTS.get(weighs(problem), 'of the objective')}"
+    return f" {called(best)} would take {less}, but {exported.before[0].fault}. {exported.instead}".rstrip()
 
 
 def _pieces(report: Report) -> str:

@@ -42,8 +42,9 @@ def unknown_key(key: str, allowed: Iterable[str]) -> str:
     now = renamed(key)
     if now is not None:
         return f"{key}: {now}"
-    hint = _hint(key.rpartition(".")[2], allowed)
-    return f"{key}: unknown key; {hint}allowed: {', '.join(sorted(allowed))}"
+    allowed = sorted(allowed)
+    hint = next(filter(None, (_hint(part, allowed) for part in reversed(key.split(".")))), "")
+    return f"{key}: unknown key; {hint}allowed: {', '.join(allowed)}"
 
 
 def unknown_option(group: str, option: str, allowed: Sequence[str]) -> str:

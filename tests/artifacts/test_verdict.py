@@ -87,7 +87,7 @@ def test_why_the_best_is_not_what_is_sent(report: Report) -> None:
     given = replace(sent, before=(passed,), instead="Do this. ")
     said = verdict(report_of(good.motions.problem, [cheap, best], given))
     assert said.startswith("Send global 1: ")
-    assert said.endswith(". lsv 1 would take 50 % less, but starts with a jump. Do this.")
+    assert said.endswith(". lsv 1 would take 50 % less energy, but starts with a jump. Do this.")
 
 
 def test_who_else_leads_to_a_motion(report: Report) -> None:
