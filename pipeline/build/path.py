@@ -19,8 +19,10 @@ from pipeline.model.arm import Arm
 from pipeline.model.kinematics import place
 from pipeline.model.task import PositionTask, Task, pose_task
 from pipeline.path.curves import Geometry, Line, Still, circle, direction_vector
+from pipeline.path.mixed import mixed
 from pipeline.path.orientation import Orientation
 from pipeline.path.reference import Reference
+from pipeline.path.spline import Sampled
 from pipeline.path.through import SAME, TURN, Through, one_after_the_other, steps, through
 from pipeline.path.timing import ConstantSpeed, Cruise, Quintic, RaisedCosine, Stamped, Timing, WithStops
 from pipeline.path.waypoints import Waypoints, read, same_point
@@ -79,11 +81,15 @@ def make_reference(path: Any, timing: TimingConfig, task: Task, q_init: Array) -
         raise ConfigError("timing.dense: its times [s] are of a motion time that is given, not of the shortest")
     count = len(task.axes)
     here = task.value(q_init[None])[0]
-    given = path.orientation is not None or any(path.turn)
+    given = path.orientation is not None or any(path.turn) or path.meters_per_radian is not None
     if given and isinstance(task, PositionTask):
         raise ConfigError(
-            "path.orientation, path.turn: the task prescribes no orientation; set robot.orientation to full or pointing"
+            "path.orientation, path.turn, path.meters_per_radian: the task prescribes no orientation; set "
+            "robot.orientation to full or pointing"
         )
+    blends = isinstance(path, WaypointsConfig) and path.corners == "blend"
+    if path.meters_per_radian is not None and blends:
+        raise ConfigError("path.meters_per_radian: path.corners = blend rounds by length alone; choose spline or stop")
     breaks: tuple[float, ...] = ()
     in_world = False
     if isinstance(path, WaypointsConfig) and is_gcode(path):
@@ -109,6 +115,7 @@ def make_reference(path: Any, timing: TimingConfig, task: Task, q_init: Array) -
                 None if rows.rotations is None else rows.rotations[a:b],
                 rest=path.corners == "stop",
                 blend=blend,
+                radian=path.meters_per_radian,
             )
             for a, b in zip(rows.begins, ends, strict=True)
         ]
@@ -125,8 +132,12 @@ def make_reference(path: Any, timing: TimingConfig, task: Task, q_init: Array) -
         in_world = path.start is not None
         law = timing_law(timing)(timing.seconds)
     if orientation is None and not isinstance(task, PositionTask):
-        orientation = _turning(path, geometry, here[count:])
+        length = geometry.length
+        geometry, orientation = _turning(path, geometry, here[count:])
+        breaks = tuple(at * geometry.length / length for at in breaks)
         in_world &= path.orientation is not None
+    if path.meters_per_radian is not None:
+        notes = (*notes, f"a radian of turning counts as {path.meters_per_radian:g} m of the path's length")
     start = np.hstack([one.sample(np.zeros(1))[0] for one in (geometry, orientation) if one is not None])
     if np.abs(task.error(q_init[None], start)).max() > 1e-12:
         q_init = place(task, q_init, start[0])
@@ -163,17 +174,22 @@ def _curve(path: Any, task: Task, here: Array) -> Geometry:
     if not path.length:
         if not any(path.turn):
             raise ConfigError("path.length = 0: the path has no length, in space or in orientation (path.turn)")
-        return Still(start, TURN * float(np.linalg.norm(path.turn)))
+        return Still(start, (path.meters_per_radian or TURN) * float(np.linalg.norm(path.turn)))
     return Line(start, direction_vector(path.direction, count), path.length)
 
 
-def _turning(path: PathConfig, geometry: Geometry, here: Array) -> Orientation:
-    """From `path.orientation` (or that of q_init) through `path.turn`, in proportion to the length."""
+def _turning(path: PathConfig, geometry: Geometry, here: Array) -> tuple[Geometry, Sampled]:
+    """From `path.orientation` (or that of q_init) through `path.turn`, in proportion to the length; and the curve, by
+    length and angle where both count.
+    """
     first = Rotation.from_rotvec(here) if path.orientation is None else Rotation.from_euler("xyz", path.orientation)
     # Turns beyond half a turn need marks between: two rotations are joined by the shorter way.
-    marks = np.linspace(0.0, 1.0, 2 + int(np.linalg.norm(path.turn) / 2))
-    turned = Rotation.from_rotvec(marks[:, None] * np.array(path.turn))
-    return Orientation(marks * geometry.length, turned * first)
+    shares = np.linspace(0.0, 1.0, 2 + int(np.linalg.norm(path.turn) / 2))
+    turned, marks = Rotation.from_rotvec(shares[:, None] * np.array(path.turn)), shares * geometry.length
+    orientation = Orientation(marks, turned * first)
+    if path.meters_per_radian is None:
+        return geometry, orientation
+    return mixed(geometry, orientation, marks, path.meters_per_radian)[:2]
 
 
 def _read(path: WaypointsConfig, timing: TimingConfig, task: Task) -> Waypoints:

@@ -48,6 +48,14 @@ class PathConfig:
         0.0,
         0.0,
     )
+    meters_per_radian: Annotated[
+        Number | None,
+        Field(
+            gt=0,
+            description="[m/rad] what turning counts of the path's length, by which the law runs through it; null: "
+            "nothing, but 0.1 on the spot",
+        ),
+    ] = None
     exact: Annotated[
         Switch,
         Field(description="whether every knot is on the path; false: a motion may use all of the tolerances, anywhere"),

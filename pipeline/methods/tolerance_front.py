@@ -15,8 +15,7 @@ from pipeline.common.arrays import Array
 from pipeline.config.methods import GlobalOptions, ParetoOptions
 from pipeline.methods.global_planner.optimum import confirmed
 from pipeline.methods.global_planner.planner import global_planner
-from pipeline.methods.global_planner.smooth import Smooth, refine
-from pipeline.methods.global_planner.tube import exactly
+from pipeline.methods.global_planner.smooth import Smooth, exactly, refine
 from pipeline.methods.method import Context
 from pipeline.problem.limits import LIMIT_KINDS
 from pipeline.problem.problem import Problem
@@ -51,10 +50,7 @@ def solve(problem: Problem, options: ParetoOptions, context: Context) -> list[So
     items = [(share, motion) for share in shares.tolist() for motion in begun]
     answers = context.workers.map(_point, (asked, options.planner), items)
     points = [min(answers[i : i + len(begun)], key=_rank) for i in range(0, len(answers), len(begun))]
-    for i in range(1, len(points)):
-        if _rank(points[i]) > _rank(points[i - 1]):
-            again = _point((asked, options.planner), (float(shares[i]), points[i - 1].curve.q))
-            points[i] = min(points[i], again, key=_rank)
+    points = descending((asked, options.planner), shares, points, float(kept[0].statistics["cost"]))
     name = next(one for one in options.objectives if one != TOLERANCE)
     first = kept[0]
     on_path = exactly(_within(asked, float(shares[0]))).reference
@@ -70,6 +66,24 @@ def solve(problem: Problem, options: ParetoOptions, context: Context) -> list[So
             solutions.append(Solution("pareto", path, Status.SOLVED, optimum=rank, **kinds))  # type: ignore[arg-type]
     solutions[0].statistics.update({"front": rows, "objectives": list(options.objectives)})
     return solutions
+
+
+def descending(
+    context: tuple[Problem, GlobalOptions], shares: Array, points: list[Smooth], on_path: float
+) -> list[Smooth]:
+    """The points, none dearer than one before it, whose tube lies within its own: else it is sought again from there,
+    and if that is of no use it is none. on_path: the cost of the motion on the path.
+    """
+    narrower, least, found = None, on_path, list[Smooth]()
+    for share, point in zip(shares.tolist(), points, strict=True):
+        if narrower is not None and not (point.converged and point.cost <= least):
+            point = min(point, _point(context, (share, narrower.curve.q)), key=_rank)
+        if point.converged and point.cost > least:
+            point = replace(point, converged=False, status="dearer than in a narrower tube")
+        if point.converged:
+            narrower, least = point, point.cost
+        found.append(point)
+    return found
 
 
 def _row(

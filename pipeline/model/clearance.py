@@ -115,6 +115,11 @@ class Clearance:
             found.append(Close(kind.name, kind.margin, float(nearest.distance), *self._named(nearest)))
         return found
 
+    def distances(self, q: Array, extent: float) -> Array:
+        """The least signed distance [m] of any kind at q (K, n): (K,); `extent` where nothing is nearer."""
+        found = [[float(pair.distance) for kind in self.kinds for pair in self._within(kind, one, extent)] for one in q]
+        return np.array([min(some, default=extent) for some in found])
+
     def rows(self, extra: float = 0.0) -> list[Rows]:
         """Of each kind the constraint that every distance is at least the margin and `extra` [m], one row per knot."""
         return [

@@ -7,13 +7,15 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from pipeline.common.arrays import Array
 from pipeline.path.blend import Blended
 from pipeline.path.curves import Geometry, Still
+from pipeline.path.mixed import splined
 from pipeline.path.orientation import Orientation
-from pipeline.path.spline import ByLength, Chain, Sampled, Spline
+from pipeline.path.spline import Chain, Sampled, Spline
 
 TURN = 0.1  # [m/rad] what a turn on the spot counts of the path's length
 SAME = 1e-12  # [m] and [rad]: below it nothing moves
@@ -62,8 +64,17 @@ def one_after_the_other(paths: Sequence[Through], begins: Sequence[int]) -> Thro
     )
 
 
-def through(points: Array, rotations: Rotation | None, *, rest: bool = False, blend: float | None = None) -> Through:
+def through(
+    points: Array,
+    rotations: Rotation | None,
+    *,
+    rest: bool = False,
+    blend: float | None = None,
+    radian: float | None = None,
+) -> Through:
     """The path through points (P, m) [m] and rotations (P); equal neighbours are a dwell, of length zero.
+
+    radian: what one of turning counts of the path's length [m]; None: nothing, but `TURN` on the spot. Not with blend.
 
     It comes to rest where it turns back, before and after it turns on the spot, and with `rest` at every corner, so
     that it is straight in between. Elsewhere it is smooth: a spline, or with `blend` [m] straight legs whose
@@ -79,22 +90,16 @@ def through(points: Array, rotations: Rotation | None, *, rest: bool = False, bl
     oriented: list[Sampled] = []
     marks, ends, closer = np.zeros(len(own)), [0.0], list[int]()
     for first, last in pairwise(breaks):
-        part = slice(first, last + 1)
-        if moves[first] > SAME:
-            curve: ByLength
-            if blend is None:
-                curve = Spline(own[part], kept[first + 1 : last + 1])
-            else:
-                curve = Blended(own[part], blend)
-                closer += [int(kept[first + i]) for i in curve.closer]
-            piece: Geometry = curve
-            local = curve.marks
+        part, between = slice(first, last + 1), slice(first, last)
+        if turned is not None and radian is not None:
+            piece, turning, local = splined(own[part], turned[part], moves[between], turns[between], radian)
+            oriented.append(turning)
         else:
-            local = TURN * np.concatenate([[0.0], np.cumsum(turns[first:last])])
-            piece = Still(own[first], float(local[-1]))
+            piece, local, near = _piece(own[part], moves[between], turns[between], kept[part][1:], blend)
+            closer += [int(kept[first + i]) for i in near]
+            if turned is not None:
+                oriented.append(Orientation(local, turned[part]))
         pieces.append(piece)
-        if turned is not None:
-            oriented.append(Orientation(local, turned[part]))
         marks[part] = ends[-1] + local
         ends.append(ends[-1] + piece.length)
     whole = len(pieces) > 1
@@ -109,6 +114,20 @@ def through(points: Array, rotations: Rotation | None, *, rest: bool = False, bl
         _departure(geometry, own, marks, kept),
         tuple(closer),
     )
+
+
+def _piece(
+    points: Array, moves: Array, turns: Array, before: NDArray[np.int_], blend: float | None
+) -> tuple[Geometry, Array, tuple[int, ...]]:
+    """What passes smoothly on, or turns on the spot; the arc lengths of its points; which are too close for `blend`."""
+    if moves[0] <= SAME:
+        local = TURN * np.concatenate([[0.0], np.cumsum(turns)])
+        return Still(points[0], float(local[-1])), local, ()
+    if blend is None:
+        smooth = Spline(points, before)
+        return smooth, smooth.marks, ()
+    rounded = Blended(points, blend)
+    return rounded, rounded.marks, tuple(rounded.closer)
 
 
 def steps(points: Array, rotations: Rotation | None) -> tuple[Array, Array]:

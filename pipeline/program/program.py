@@ -20,7 +20,7 @@ from pipeline.problem.problem import Boundary, Problem
 from pipeline.program import ipopt
 from pipeline.program.differentiable import DifferentiableConstraint, DifferentiableCost
 from pipeline.program.residuals import Conditions
-from pipeline.program.scaling import POSITION_SCALE, Guess, Scaling, Sums, lifted, scale
+from pipeline.program.scaling import POSITION_SCALE, Guess, Prices, Scaling, Sums, lifted, scale
 
 KNOTS_PER_BINDING = 10  # a Python binding pays for its size squared: more, smaller bindings are cheaper up to a point
 POSITIONS_PER_BINDING = 25  # of knots whose positions alone it takes
@@ -53,6 +53,7 @@ class Lifted:
     weights: Array  # (S,) [s] of that sum
     left_out: tuple[int, ...] = ()  # knots at which the path is not asked for
     tube: Array  # (N + 1, 2) the shares of the path's tolerances by which it may be left at the knots, if it may
+    prices: Prices | None = None  # of the path, where they are known
 
     def __init__(
         self, problem: Problem, times: Array, guess: Array, *, elastic: Collection[str] = (), keep_off: float = 0.0
@@ -70,6 +71,7 @@ class Lifted:
         self.drake = MathematicalProgram()
         self._unknowns: dict[str, NDArray[Any]] = {}
         self._rows: list[DifferentiableConstraint] = []
+        self.followed: list[tuple[Block, Any]] = []  # knots, and the binding that keeps them on their path
         self.functions: dict[Any, DifferentiableCost | DifferentiableConstraint] = {}  # by evaluator
         self.y = self.new("y", POSITION_SCALE * guess)
 
@@ -83,13 +85,16 @@ class Lifted:
     def __getitem__(self, name: str) -> NDArray[Any]:
         return self._unknowns[name]
 
-    def add_rows(self, function: Any, target: Array, unknowns: Any, pattern: list[tuple[int, int]]) -> None:
-        """function(x) -> (values, Jacobian) equals `target`; pattern: the Jacobian's entries that can differ from 0."""
+    def add_rows(self, function: Any, target: Array, unknowns: Any, pattern: list[tuple[int, int]]) -> Any:
+        """function(x) -> (values, Jacobian) equals `target`; pattern: the Jacobian's entries that can differ from 0.
+        Returns the binding.
+        """
         rows = DifferentiableConstraint(function)
         binding = self.drake.AddConstraint(rows, lb=target, ub=target, vars=unknowns)
         binding.evaluator().SetGradientSparsityPattern(pattern)
         self.functions[binding.evaluator()] = rows
         self._rows.append(rows)
+        return binding
 
     def add_cost(self, function: Callable[[Array], tuple[float, Array]], unknowns: Any) -> None:
         """function(x) -> (value, gradient) is part of the objective."""

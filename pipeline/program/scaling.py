@@ -15,7 +15,7 @@ import numpy as np
 from pipeline.common.arrays import Array
 from pipeline.problem.costs import Costs, integrals, row_kinds, velocities
 from pipeline.problem.integrals import of_order
-from pipeline.problem.lagrangian import Lagrangian
+from pipeline.problem.lagrangian import Lagrangian, trapezoid_weights
 from pipeline.problem.problem import Problem
 
 POSITION_SCALE = 0.03
@@ -99,6 +99,21 @@ class Scaling:
     def to_w(self, qd: Array) -> Array:
         """w (N, n) of the intervals' velocities qd (N, n)."""
         return np.linalg.solve(self.to_velocity, qd[:, :, None])[:, :, 0]
+
+
+@dataclass(frozen=True)
+class Prices:
+    """What leaving the path is worth: by how much the objective, 1 at its guess, falls per meter, and per radian, and
+    second at each of `times` (K,): rates (K, 2) [1/(m s), 1/(rad s)].
+    """
+
+    times: Array
+    rates: Array
+
+    def at(self, times: Array) -> Array:
+        """At the knots of other times (N + 1, 2) [1/m, 1/rad]."""
+        found = np.transpose([np.interp(times, self.times, rate) for rate in self.rates.T])
+        return np.asarray(found * trapezoid_weights(times)[:, None])
 
 
 def scale(problem: Problem, sums: Sums, costs: Costs, forces: Forces) -> Scaling:

@@ -37,7 +37,8 @@ LEAP = 0.5  # [rad] that following the path may take from place to place; more i
 class Components:
     """places (P,): arc lengths [m]; nodes: of each place the configurations (K, n) that are allowed; labels: of each
     node its component; links: which components (A, B) of a place and the next are connected, steps: which nodes, in
-    pairs; spacing [rad] of nodes along the loops, infinite where they are samples.
+    pairs; spacing [rad] of nodes along the loops, infinite where they are samples; turning (n,): the joints that come
+    round again.
     """
 
     places: Array
@@ -46,6 +47,7 @@ class Components:
     links: Sequence[NDArray[np.bool_]]
     steps: Sequence[tuple[NDArray[np.int_], NDArray[np.int_]]]
     spacing: float
+    turning: NDArray[np.bool_]
 
     def furthest(self, first: int) -> int:
         """The last place that a continuous motion from the place `first` can reach; -1: nothing is allowed there."""
@@ -93,7 +95,7 @@ def components(problem: Problem, count: int, nodes: int, rng: np.random.Generato
         link[labels[i][here], labels[i + 1][there]] = True
         links.append(link)
         steps.append((here, there))
-    return Components(places, allowed, labels, links, steps, spacing)
+    return Components(places, allowed, labels, links, steps, spacing, turning)
 
 
 def motions(found: Components, first: int, last: int, manifold: Manifold, most: int) -> Array:
@@ -141,7 +143,7 @@ def _count(labels: NDArray[np.int_]) -> int:
     return int(labels.max(initial=-1)) + 1
 
 
-def _around(q: Array, turning: NDArray[np.bool_]) -> Array:
+def around(q: Array, turning: NDArray[np.bool_]) -> Array:
     """Coordinates in which joints that turn for ever are on a circle, so that near is near."""
     return np.hstack([q[:, ~turning], np.cos(q[:, turning]), np.sin(q[:, turning])])
 
@@ -149,8 +151,8 @@ def _around(q: Array, turning: NDArray[np.bool_]) -> Array:
 def _components(q: Array, near: float, turning: NDArray[np.bool_]) -> NDArray[np.int_]:
     if not len(q):
         return np.empty(0, int)
-    around = _around(q, turning)
-    return np.asarray(connected_components(cdist(around, around) <= near, directed=False)[1])
+    flat = around(q, turning)
+    return np.asarray(connected_components(cdist(flat, flat) <= near, directed=False)[1])
 
 
 def _led(
@@ -161,6 +163,6 @@ def _led(
         return np.empty(0, int), np.empty(0, int)
     moved, arrived = manifold.project(q, np.tile(target, (len(q), 1)), steps=10)
     follows = np.asarray(arrived & (np.abs(moved - q).max(axis=1) <= LEAP))
-    pairs = (cdist(_around(moved, turning), _around(other, turning)) <= near) & follows[:, None]
+    pairs = (cdist(around(moved, turning), around(other, turning)) <= near) & follows[:, None]
     own, others = np.nonzero(pairs)
     return own, others

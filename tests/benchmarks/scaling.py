@@ -1,15 +1,18 @@
 """How the planner's time grows with knots and starts, and how its success grows with starts.
 
 Knots: the best motion of an experiment, from the spline of the grid before, by Newton's method and IPOPT's
-confirmation, and by the peer. Starts: one batch on the first grid, random paths of the roadmap. Success: of the
-suite's problems, how many starts find the best and which share of all known optima. Timed is processor time.
+confirmation, and by the peer. Plans: whole ones of eight starts, on grids each twice as fine. Starts: one batch on the
+first grid, random paths of the roadmap. Success: of the suite's problems, how many starts find the best and which share
+of all known optima. Timed is processor time.
 """
 
 from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -30,8 +33,17 @@ from tests.benchmarks.planner import Peer
 from tests.suite.planar import FILE
 from tests.support import composed
 
-PARTS = ("knots", "starts", "success")
+PARTS = ("knots", "plans", "starts", "success")
 KNOTS, STARTS, LOTS = (25, 50, 100, 200, 400, 1000), (1, 4, 16, 48, 96, 192), (1, 2, 4, 8, 16, 32, 64)
+SPIRAL = Path(__file__).parents[1] / "suite" / "problems" / "spiral300.csv"
+PLANS = {
+    "planar3r, line": (250, "path.length=0.25", "path.direction=170", "timing.duration=4"),
+    "panda, line": (250, "+experiment=panda"),
+    "xarm7, spiral of 300 way-points": (
+        *(1000, "robot=xarm7", "robot.q_init=null", "path=waypoints", f"path.file={SPIRAL}"),
+        *("limits=joint", "timing.duration=60", "boundary.rest=[]"),
+    ),
+}
 SAME = 1e-4  # relative: costs of one optimum
 REPEATS = 5
 
@@ -90,6 +102,25 @@ def knots(name: str, sizes: tuple[int, ...] = KNOTS, repeats: int = REPEATS) -> 
         )
 
 
+def plans(names: Sequence[str] = tuple(PLANS), doublings: int = 2, repeats: int = 3) -> None:
+    """One row for each problem: seconds on N, 2 N, 4 N intervals, interleaved, and each over the one before."""
+    options = GlobalOptions(optimised=8, budget=8)
+    print("plans: intervals   seconds   each over the one before")
+    for name in names:
+        first, *words = PLANS[name]
+        sizes = [int(first) * 2**k for k in range(doublings + 1)]
+        problems = [prepare(composed(*map(str, words), f"timing.steps={size}")) for size in sizes]
+        spent = np.array(
+            [
+                [milliseconds(lambda one=one: global_planner(one, options), 1) for one in problems]
+                for _ in range(repeats)
+            ]
+        )
+        took = np.median(spent, axis=0) / 1e3
+        seconds, ratios = (" ".join(f"{value:.2f}" for value in row) for row in (took, took[1:] / took[:-1]))
+        print(f"{name}: {' '.join(map(str, sizes))}   {seconds}   {ratios}", flush=True)
+
+
 def starts(name: str, sizes: tuple[int, ...] = STARTS, repeats: int = REPEATS) -> None:
     """One row for each number of starts."""
     problem = problem_of(name)
@@ -139,7 +170,8 @@ def main(words: list[str]) -> None:
     if unknown:
         sys.exit(f"{', '.join(sorted(unknown))}: not one of {', '.join(PARTS)}")
     for word in words or PARTS:
-        if word == "success":
-            success()
-        for name in ("sim1", "panda") if word != "success" else ():
+        if word in ("plans", "success"):
+            {"plans": plans, "success": success}[word]()
+            continue
+        for name in ("sim1", "panda"):
             {"knots": knots, "starts": starts}[word](name)

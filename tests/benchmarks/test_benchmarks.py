@@ -75,12 +75,14 @@ def test_a_bound_from_below(capsys: pytest.CaptureFixture[str]) -> None:
 def test_scaling(capsys: pytest.CaptureFixture[str]) -> None:
     scaling.knots("sim1", sizes=(12, 24), repeats=1)
     scaling.starts("sim1", sizes=(1, 4), repeats=1)
+    scaling.plans(["planar3r, line"], doublings=1, repeats=1)
     scaling.success(["fixed2"], lots=(2,))
     out = capsys.readouterr().out
     rows = re.findall(r"^ +(12|24) +(\S+) +(\S+) +(\S+) +(\S+) +(\S+)$", out, re.M)
     assert len(rows) == 2
     assert all(float(number) > 0 for row in rows for number in row)
     assert len(re.findall(r"^ +[14] +(\S+) +(\S+) +(\S+) +(\S+)$", out, re.M)) == 2
+    assert re.search(r"^planar3r, line: 250 500   \d+\.\d+ \d+\.\d+   \d+\.\d+$", out, re.M)
     assert re.search(r"^ +default +1 of +1 +1 of +1 ", out, re.M)
 
 

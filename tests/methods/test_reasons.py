@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -9,12 +10,14 @@ import pytest
 
 from pipeline.build.problem import prepare
 from pipeline.common.errors import ConfigError
+from pipeline.config.methods import GlobalOptions
 from pipeline.methods.global_planner.optimum import Optimum
 from pipeline.methods.global_planner.planner import global_planner
 from pipeline.methods.global_planner.reasons import no_feasible, no_optimum, no_start
 from pipeline.methods.method import Context
 from pipeline.path.curves import Line
 from pipeline.path.reference import Reference
+from pipeline.problem.limits import Limits
 from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Status
 from pipeline.program.feasibility import Relaxed, Violation
@@ -47,6 +50,33 @@ def test_a_path_out_of_reach_is_said_with_where_and_by_how_much() -> None:
     far = np.linalg.norm(gone.reference.position(gone.times), axis=1) - length
     assert f"leaves the reach of the arm, first at t = {gone.times[np.argmax(far > 0)]:.3g} s" in said
     assert float(said.split("by up to ")[1].split()[0]) == pytest.approx(far.max(), rel=5e-3)
+
+
+@pytest.mark.slow
+def test_a_place_that_the_joints_limits_forbid_is_named_with_what_lacks() -> None:
+    """Held against the closed form of the two outer joints, for every angle of the first one."""
+    problem = stated(
+        "path.start=[0.3,-0.1]", "path.direction=90", "path.length=0.2", "timing.steps=20", "boundary=free"
+    )
+    most = np.array([0.3, 1.5, 1.5])
+    held = replace(problem, limits=replace(Limits.none(3), lower=-most, upper=most))
+    (nothing,) = global_planner(held, GlobalOptions(optimised=4, nodes=40), Context(1))
+    assert nothing.status is Status.INFEASIBLE
+    said = re.fullmatch(
+        r"at (\S+) m along the path .* the nearest is (\S+) beyond that of joint\d \(.*\)", nothing.message
+    )
+    assert said is not None, nothing.message
+    place, excess = map(float, said.groups())
+    (a, b, c), q1 = (0.176, 0.176, 0.1375), np.linspace(-np.pi, np.pi, 200_001)
+    x, y = 0.3 - a * np.cos(q1), place - 0.1 - a * np.sin(q1)
+    cosine = (x**2 + y**2 - b**2 - c**2) / (2 * b * c)
+    least = np.inf
+    for bent in np.arccos(np.where(np.abs(cosine) <= 1, cosine, np.nan)) * np.array([[1.0], [-1.0]]):
+        q2 = np.arctan2(y, x) - np.arctan2(c * np.sin(bent), b + c * np.cos(bent)) - q1
+        q = np.stack([q1, (q2 + np.pi) % (2 * np.pi) - np.pi, bent])
+        least = min(least, float(np.nanmin((np.abs(q) - most[:, None]).max(axis=0))))
+    assert excess == pytest.approx(least, abs=5e-3)
+    assert excess > 0.05
 
 
 def test_no_path_through_a_grid() -> None:

@@ -8,18 +8,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
 
 from pipeline.build.problem import prepare
 from pipeline.common.arrays import Array
 from pipeline.common.errors import InputError
 from pipeline.config.methods import GlobalOptions, SegmentsOptions
 from pipeline.evaluation.evaluation import evaluate
+from pipeline.evaluation.plant import SinglePlant
 from pipeline.methods.global_planner.planner import global_planner
 from pipeline.methods.segments.segments import segments
 from pipeline.methods.segments.transit import Transits
 from pipeline.problem.limits import Limits
 from pipeline.problem.problem import Problem
-from pipeline.problem.solution import Status
+from pipeline.problem.solution import Status, Trajectory
 from pipeline.search.continuity import components, fewest
 from tests.support import composed
 
@@ -145,3 +147,28 @@ def test_a_transit_goes_round_what_stands_in_its_way() -> None:
     assert way is not None
     assert transits.manifold.allowed(way.q).all()
     np.testing.assert_allclose(way.q[[0, -1]], [start, end])
+
+
+def test_a_transit_takes_the_time_that_its_torques_need() -> None:
+    """By the evaluation's own plant on the exported motion, under gravity; and it could not be much faster."""
+    words = ("robot=panda", "limits=joint_torque_power", "limits.power=40", "gravity=earth", "collision.self=false")
+    problem = prepare(composed(*words, "path.direction=[0,1,0]", "path.length=0.1"))
+    bounds, plant = problem.bounds, SinglePlant(problem.task.arm)
+    start, end = np.array([0.0, -0.5, 0.0, -2.0, 0.0, 1.5, 0.0]), np.array([0.9, 0.6, 0.2, -1.2, 0.3, 2.0, 0.4])
+
+    def transit(share: float) -> Trajectory | None:
+        limits = replace(bounds, torque=share * bounds.torque, power=share * bounds.power)
+        return Transits(replace(problem, limits=limits), np.random.default_rng(1))(start, end)
+
+    way, quick = transit(0.6), transit(np.inf)
+    assert way is not None
+    assert quick is not None
+    motion, most = CubicSpline(way.time, way.q, bc_type="clamped"), 0.0
+    for t in np.linspace(0.0, way.time[-1], 201):
+        q, v, a = (motion(t, order) for order in range(3))
+        plant.at(q, v)
+        tau = plant.torque(a)
+        most = max(most, float((np.abs(tau) / bounds.torque).max()), float((np.abs(tau * v) / bounds.power).max()))
+    assert 0.585 < most <= 0.6
+    assert way.time[-1] > 2 * quick.time[-1]
+    assert transit(0.5) is None  # it could not even stand there

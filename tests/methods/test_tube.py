@@ -7,6 +7,7 @@ from dataclasses import replace
 import casadi as ca
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
 
 from pipeline.build.problem import prepare
 from pipeline.common.arrays import Array
@@ -14,12 +15,15 @@ from pipeline.common.errors import InputError
 from pipeline.config.methods import GlobalOptions, ParetoOptions
 from pipeline.evaluation.evaluation import evaluate
 from pipeline.methods.global_planner.planner import global_planner
-from pipeline.methods.global_planner.smooth import refine
-from pipeline.methods.lsv import lsv
+from pipeline.methods.global_planner.smooth import Searches, exactly, refine
+from pipeline.methods.lsv import inertia_weighted, lsv
 from pipeline.methods.pareto import pareto
+from pipeline.methods.tolerance_front import descending
 from pipeline.problem.costs import objective_values
 from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Solution, Status, Trajectory
+from pipeline.program.spline.curve import objective
+from pipeline.program.spline.tighten import peaks
 from pipeline.program.transcription import transcribe
 from pipeline.studies.front import Front, draw, table, unit
 from tests.benchmarks.peer import QUIET, ROBOT, PlanarArm
@@ -149,3 +153,56 @@ def test_who_uses_a_tube() -> None:
         pareto(line(free_law=True), ways)
     with pytest.raises(InputError, match=r"one of them goes with an integral$"):
         pareto(line(), replace(ways, objectives=("path_tolerance", "duration")))
+
+
+@pytest.mark.slow
+def test_the_prices_of_a_path_say_what_a_small_tolerance_buys() -> None:
+    """To first order the cost falls by the price at each knot times the tolerance there."""
+    asked = replace(line(), reference=line().reference.within(1e-2))
+    on_path = refine((exactly(asked), FEW), weighted(free_line(16)))
+    searches = Searches(FEW)
+    searches.value(asked, on_path.curve)
+    within = searches.lazily(asked, on_path.curve)
+    assert within.outcome.converged
+    assert searches.prices is not None
+    predicted = float(searches.prices.at(asked.times)[:, 0].sum()) * asked.reference.tolerance
+    assert 1 - objective(asked, within.curve) / on_path.cost == pytest.approx(predicted, rel=0.01)
+
+
+@pytest.mark.slow
+def test_a_pose_of_seven_joints_in_a_tube() -> None:
+    """From rest within the limits of a data sheet: the motion stays in the tube between its knots and costs less."""
+    words = ("timing.steps=10", "path.exact=false", "path.tolerance=1e-3", "path.orientation_tolerance=1e-3")
+    asked = prepare(composed("+experiment=panda_sendable", *words))
+    own = inertia_weighted(replace(exactly(asked), rest=(False, False), zero_acceleration=False))[0].trajectory
+    found = refine((asked, FEW), CubicSpline(own.time, own.q)(asked.times))
+    assert found.converged, found.status
+    moments = np.linspace(0.0, asked.times[-1], 4001)
+    error = asked.task.error(found.curve(moments), asked.reference.position(moments))
+    for part in (error[:, :3], error[:, 3:]):
+        assert np.linalg.norm(part, axis=1).max() == pytest.approx(1e-3, rel=0.01)
+        assert np.linalg.norm(part, axis=1).max() <= 1e-3 * (1 + 1e-6)
+    assert found.cost < 0.995 * refine((exactly(asked), FEW), found.curve.q).cost
+
+
+@pytest.mark.slow
+def test_no_point_of_a_front_is_dearer_than_one_in_a_narrower_tube() -> None:
+    """Of two points that are, one is sought again from the narrower tube's, the other is none."""
+    asked = line(8)
+    guess = weighted(free_line(8))
+    good = refine((asked, FEW), guess)
+    on_path = refine((exactly(asked), FEW), guess)
+    dear = replace(good, cost=2 * good.cost)
+    shares = np.array([0.5, 1.0])
+    found = descending((asked, FEW), shares, [refine((asked, FEW), guess), dear], on_path.cost)
+    assert [one.converged for one in found] == [True, True]
+    assert found[1].cost <= found[0].cost
+    (lost,) = descending((asked, FEW), shares[:1], [dear], on_path.cost)
+    assert (lost.converged, lost.status) == (False, "dearer than in a narrower tube")
+
+
+def test_the_peak_between_samples() -> None:
+    """Of a parabola it is exact, on uneven samples too; what falls or rises stays as it is."""
+    moments = np.array([0.0, 0.2, 0.35, 0.6, 1.0])
+    assert peaks(moments, 1 - (moments - 0.3) ** 2).max() == pytest.approx(1.0, abs=1e-12)
+    np.testing.assert_array_equal(peaks(moments, moments), moments)

@@ -62,3 +62,9 @@ def ceiling(best: float, times: float) -> float:
     make it.
     """
     return best + (times - 1) * abs(best) if np.isfinite(times) else np.inf
+
+
+def nearest(problem: Problem, optimum: Optimum, others: list[Optimum]) -> int:
+    """Which of the others' motions is nearest."""
+    apart = wrap(np.array([other.q for other in others]) - optimum.q, problem.task.arm.description.revolute)
+    return int(np.abs(apart).max(axis=(1, 2)).argmin())

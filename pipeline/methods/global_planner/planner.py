@@ -15,19 +15,18 @@ from scipy.interpolate import CubicSpline
 
 from pipeline.common.arrays import Array
 from pipeline.config.methods import GlobalOptions
+from pipeline.methods.global_planner import reasons
 from pipeline.methods.global_planner.apart import AGAIN, FEW, LOST, apart, blamed, keeps_own, without_own
-from pipeline.methods.global_planner.basins import Basins, basins, ceiling
+from pipeline.methods.global_planner.basins import Basins, basins, ceiling, nearest
 from pipeline.methods.global_planner.batch import JUMPS, Batch
 from pipeline.methods.global_planner.grids import coarsest, finer, on_knots, refinement, served
 from pipeline.methods.global_planner.optimum import Optimum, go_on, optimise_start, refine
 from pipeline.methods.global_planner.ranking import in_order
-from pipeline.methods.global_planner.reasons import counted, no_feasible, no_optimum, no_start, other_grid
-from pipeline.methods.global_planner.smooth import freer, nothing, rough, smooth, splined, unserved
+from pipeline.methods.global_planner.smooth import exactly, freer, nothing, rough, smooth, splined, unserved
 from pipeline.methods.global_planner.starts import Known, Starts
 from pipeline.methods.global_planner.timed import timed
-from pipeline.methods.global_planner.tube import exactly, loosened
+from pipeline.methods.global_planner.tube import loosened
 from pipeline.methods.method import ALONG_LOOPS, WITH_TIMING, Context, Method
-from pipeline.model.kinematics import wrap
 from pipeline.problem.limits import LIMIT_KINDS
 from pipeline.problem.problem import Problem
 from pipeline.problem.resolution import MOST
@@ -90,7 +89,8 @@ def _searched(
     drawn = Starts(given, grids[0], options, np.random.default_rng(context.seed), known)
     motions, log = drawn.first, drawn.log
     if not len(motions):
-        return [nothing(problem, Status.INFEASIBLE, no_start(problem, log.get("drawn", 0)), log)]
+        why_none = log.get("barred") or reasons.no_start(problem, log.get("drawn", 0))
+        return [nothing(problem, Status.INFEASIBLE, why_none, log)]
 
     batch = Batch(problem, options) if why is None else None
     context.phase(f"solving them on {len(grids[0]) - 1} intervals")
@@ -99,13 +99,15 @@ def _searched(
         starts = _optimise_starts(problem, grids[0], options, motions, batch, context)
         if any(start.converged for start in starts):
             break
+        if grids[0] is drawn.grid and (barred := reasons.no_place(problem, grids[0])):
+            return [nothing(problem, Status.INFEASIBLE, barred, log)]
         relaxed = _relaxed(problem, grids[0], motions)
         if relaxed is not None and relaxed.feasible:
             starts += context.workers.map(optimise_start, (problem, grids[0], options), [relaxed.q])
             if starts[-1].converged:
                 break
         elif relaxed is not None and (relaxed.worst.relative > HOPELESS or len(grids) == 1):
-            return [nothing(problem, Status.INFEASIBLE, no_feasible(len(motions), relaxed), log)]
+            return [nothing(problem, Status.INFEASIBLE, reasons.no_feasible(len(motions), relaxed), log)]
         if len(grids) == 1:
             break
         # A coarse grid can be infeasible where a finer one is not: its finite differences are other numbers.
@@ -143,14 +145,14 @@ def _searched(
             return blamed(problem, near, _searched(posed, posed, options, context, known))
     log["jumping_optima"] = coarse.jumping + sum(fine.converged and not fine.continuous for fine in refined)
     if not found:
-        why_not = no_optimum(problem, grids[0], starts, refined, coarse.jumping)
+        why_not = reasons.no_optimum(problem, grids[0], starts, refined, coarse.jumping)
         return [nothing(problem, Status.NOT_CONVERGED, why_not, log)]
     members = {id(fine): count for fine, count in found}
     ranked = in_order(problem, basins(problem, problem.times, [fine for fine, _ in found], options.same_path).optima)
-    words = counted(len(ranked), len(starts), coarse.barren, left)
+    words = reasons.counted(len(ranked), len(starts), coarse.barren, left)
     solutions = []
     for rank, (fine, moved) in enumerate(ranked):
-        said = other_grid(problem, asked, options, [fine.q]) if rank == 0 else ""
+        said = reasons.on_how_many(problem, asked, options, [fine.q]) if rank == 0 else ""
         own = {"starts_in_basin": members[id(fine)], **(log if rank == 0 else {})}
         solution = as_solution(problem, fine, options)
         solutions.append(
@@ -296,13 +298,7 @@ def _optimise_starts(
     further = [next(others) if optimum is None else optimum for optimum in served]
     for count, optimum in enumerate(filter(None, served), len(left) + 1):
         done(count, optimum)
-    return [further[_nearest(problem, first, chosen)] if first.converged else first for first in firsts]
-
-
-def _nearest(problem: Problem, optimum: Optimum, others: list[Optimum]) -> int:
-    """Which of the others' motions is nearest."""
-    apart = wrap(np.array([other.q for other in others]) - optimum.q, problem.task.arm.description.revolute)
-    return int(np.abs(apart).max(axis=(1, 2)).argmin())
+    return [further[nearest(problem, first, chosen)] if first.converged else first for first in firsts]
 
 
 def _refine_all(

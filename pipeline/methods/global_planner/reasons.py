@@ -17,10 +17,13 @@ from pipeline.model.kinematics import ATTEMPTS, reach
 from pipeline.problem.problem import Problem
 from pipeline.problem.resolution import MOST
 from pipeline.program.feasibility import Relaxed, violations
+from pipeline.search.barred import barred
 
 OTHERS = "more starts (method.global.optimised) or other ones (method.global.starts)"
 
 REACHED = 1e-6  # [m, rad]
+
+NODES = 1000  # of the longest self-motion manifold
 
 
 def counted(optima: int, starts: int, barren: int, left: int = 0) -> str:
@@ -32,6 +35,14 @@ def counted(optima: int, starts: int, barren: int, left: int = 0) -> str:
 
 def _named(count: int) -> str:
     return "optimum" if count == 1 else "optima"
+
+
+def on_how_many(problem: Problem, asked: int, options: GlobalOptions, motions: list[Array]) -> str:
+    """That the grid is not the one that was asked for, and not the one that would do."""
+    count = len(problem.times) - 1
+    said = f"on {count} intervals: the {asked} of timing.steps are too few for path.tolerance" * (count > asked)
+    more = options.refine_to is not None and finer(problem, MOST, motions) is not None
+    return "; ".join(filter(None, [said, f"method.global.refine_to = {options.refine_to} allows no more" * more]))
 
 
 def no_start(problem: Problem, drawn: int) -> str:
@@ -52,6 +63,18 @@ def no_start(problem: Problem, drawn: int) -> str:
         f"none of {drawn} motions that were drawn follows the path to its end; try other ones (method.global.starts), "
         "more of them (method.global.candidates), or another robot.q_init: from a singular one many get stuck"
     )
+
+
+def no_place(problem: Problem, times: Array) -> str:
+    """That at some place of the path no configuration is within the position limits, where r = 1 lets that be seen at
+    the knots `times`; else nothing.
+    """
+    bounds = problem.bounds
+    limited = bool(np.isfinite(bounds.lower).any() or np.isfinite(bounds.upper).any())
+    if problem.task.redundancy != 1 or problem.task.arm.base.count or not limited:
+        return ""
+    found = barred(problem, times, NODES)
+    return "" if found is None else found.sentence
 
 
 def no_feasible(starts: int, relaxed: Relaxed) -> str:
@@ -89,14 +112,6 @@ def too_near(problem: Problem, optima: int, closest: Closest) -> str:
         f"collision.allow=[[{closest.first},{closest.second}]], or by a smaller collision.margin or an SRDF "
         "(collision.srdf)"
     )
-
-
-def other_grid(problem: Problem, asked: int, options: GlobalOptions, motions: list[Array]) -> str:
-    """That the grid is not the one that was asked for, and not the one that would do."""
-    count = len(problem.times) - 1
-    said = f"on {count} intervals: the {asked} of timing.steps are too few for path.tolerance" * (count > asked)
-    more = options.refine_to is not None and finer(problem, MOST, motions) is not None
-    return "; ".join(filter(None, [said, f"method.global.refine_to = {options.refine_to} allows no more" * more]))
 
 
 def unmet(status: str, violation: float, optimality: float) -> str:

@@ -21,10 +21,12 @@ from pipeline.methods.method import Context
 from pipeline.problem.limits import FREE, LIMIT_KINDS
 from pipeline.problem.problem import Boundary, Problem
 from pipeline.problem.solution import Solution, Status, Trajectory
+from pipeline.program.scaling import Prices
 from pipeline.program.spline.curve import Curve, objective
 from pipeline.program.spline.program import Solved, why_not
 from pipeline.program.spline.tighten import excesses, keeps_forces, tighten, without_forces, worst
 from pipeline.program.spline.transcription import transcribe
+from pipeline.program.terms.tracking import prices
 from pipeline.search.selection import distinct
 
 STEPS = 25  # intervals of the first grid where torques count
@@ -63,6 +65,7 @@ class Searches:
     options: GlobalOptions
     solves: list[dict[str, Any]] = field(default_factory=list)
     last: Curve | None = None  # that a solve has converged to
+    prices: Prices | None = None  # of a path that need not be kept exactly
 
     @property
     def given(self) -> dict[str, Any]:
@@ -82,13 +85,20 @@ class Searches:
     def lazily(self, problem: Problem, guess: Curve) -> Solved:
         """Torque and power limits come in only where the optimum without them breaks them."""
         loose = without_forces(problem)
-        solved = self.note(transcribe(loose, guess).solve(**self.given))
+        solved = self.note(transcribe(loose, guess, prices=self.prices).solve(**self.given))
         if not solved.outcome.converged or keeps_forces(problem, solved.curve):
             return solved
         return self.whole(problem, solved.curve)
 
     def whole(self, problem: Problem, guess: Curve) -> Solved:
-        return self.note(transcribe(problem, guess).solve(**self.given))
+        return self.note(transcribe(problem, guess, prices=self.prices).solve(**self.given))
+
+    def value(self, problem: Problem, guess: Curve) -> None:
+        """Learn from the motion on the path what leaving it is worth, if it may be left."""
+        if problem.reference.exact:
+            return
+        solved = self.lazily(exactly(problem), guess)
+        self.prices = prices(solved.program, solved.outcome) if solved.outcome.converged else None
 
 
 def splined(problem: Problem, options: GlobalOptions) -> bool:
@@ -113,11 +123,15 @@ def unserved(problem: Problem, options: GlobalOptions) -> str | None:
     return None
 
 
+def exactly(problem: Problem) -> Problem:
+    """The problem whose path is to be kept exactly."""
+    return replace(problem, reference=replace(problem.reference, exact=True))
+
+
 def rough(problem: Problem) -> Problem:
     """The problem without what differences do not know."""
     limits = replace(problem.bounds, acceleration=FREE, jerk=FREE)
-    reference = replace(problem.reference, exact=True)
-    given = replace(problem, reference=reference, rest=(False, False), zero_acceleration=False, limits=limits)
+    given = replace(exactly(problem), rest=(False, False), zero_acceleration=False, limits=limits)
     return replace(given, free_law=False, free_duration=False)
 
 
@@ -233,6 +247,7 @@ def _refine(problem: Problem, options: GlobalOptions, motion: Array) -> Smooth:
     solver, finer = Searches(options), [problem.times] if served else grids(problem)
     if not served:
         guess = Curve.through(problem, finer[0], CubicSpline(problem.times, motion)(finer[0]))
+    solver.value(problem, guess)
     solved = solver.lazily(problem, guess)
     if len(finer) > 1 and not solved.outcome.converged:
         guess = Curve.through(problem, finer[-1], motion)

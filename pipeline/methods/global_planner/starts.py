@@ -15,6 +15,7 @@ from scipy.interpolate import CubicSpline
 
 from pipeline.common.arrays import Array
 from pipeline.config.methods import GlobalOptions
+from pipeline.methods.global_planner.reasons import no_place
 from pipeline.problem.problem import Problem
 from pipeline.search import bellman
 from pipeline.search.configurations import starting_points
@@ -65,7 +66,12 @@ def _roadmap(starts: Starts) -> tuple[Array, Further]:
     roadmap = Roadmap(problem, starts.grid, starts.rng, nodes=options.nodes, layers=options.layers)
     paths = roadmap.cheapest(options.optimised)
     starts.log["roadmap_paths"] = len(paths)
-    return (paths, roadmap.random) if len(paths) else _instead(starts)
+    if len(paths):
+        return paths, roadmap.random
+    if barred := no_place(problem, starts.grid):
+        starts.log["barred"] = barred
+        return starts.none(), starts.none
+    return _instead(starts)
 
 
 def _instead(starts: Starts) -> tuple[Array, Further]:

@@ -26,11 +26,6 @@ ROUNDS = 4
 ROOM = 1e-3  # relative, on what is made smaller
 
 
-def exactly(problem: Problem) -> Problem:
-    """The problem whose path is to be kept exactly."""
-    return replace(problem, reference=replace(problem.reference, exact=True))
-
-
 def loosened(problem: Problem, found: list[Solution], options: GlobalOptions, context: Context) -> list[Solution]:
     """The distinct optima to which those on the path, `found`, lead, best first; or one solution that says why not."""
     motions, log = [solution.trajectory.q for solution in found if solution.found], found[0].statistics

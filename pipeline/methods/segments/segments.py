@@ -18,27 +18,32 @@ from pipeline.common.errors import InputError
 from pipeline.config.methods import SegmentsOptions
 from pipeline.methods.global_planner.planner import global_planner
 from pipeline.methods.global_planner.planner import solve as plan
+from pipeline.methods.global_planner.reasons import no_place
 from pipeline.methods.method import Context, Method, Serves
 from pipeline.methods.segments.transit import Transits
 from pipeline.problem.problem import Boundary, Problem
 from pipeline.problem.solution import Solution, Status, Trajectory
 from pipeline.search.continuity import Components, components, fewest, motions, places_of
 from pipeline.search.manifold import Manifold
+from pipeline.search.widest import widest
 
 WAYS = 16  # of a piece, from which its optimum is sought
 MOST_TIMES = 4  # so many times the nodes that are asked for, where fewer leave cuts
 STEADY = 1  # doublings after one another that leave no fewer cuts
+LOOKED = 50  # intervals of a tool path on which it is seen how far beyond the joints' limits it leads
 FEWEST = 20  # intervals of a piece, and of a tool path on which it is cut
 
 
 @dataclass(frozen=True)
 class Piece:
-    """Along the path at places (P,) [m] the ways (K, P, n) that continuous motions can go; between: [m] where the cut
-    before it may be, None: another tool path begins there, or the motion.
+    """Along the path at places (P,) [m] the ways (K, P, n) that continuous motions can go, none where they have to move
+    while the tool stands; q (n,): from where it can begin; between: [m] where the cut before it may be, None: another
+    tool path begins there, or the motion.
     """
 
     places: Array
     ways: Array
+    q: Array
     between: tuple[float, float] | None = None
 
     @property
@@ -48,10 +53,6 @@ class Piece:
     @property
     def end(self) -> float:
         return float(self.places[-1])
-
-    @property
-    def q(self) -> Array:
-        return np.asarray(self.ways[0, 0])
 
 
 @dataclass(frozen=True)
@@ -74,21 +75,26 @@ def solve(problem: Problem, options: SegmentsOptions, context: Context) -> list[
     """The pieces in their order, each with its optimum and the transit to it."""
     rng, length = np.random.default_rng(context.seed), problem.reference.geometry.length
     pieces: list[Piece] = []
+    widths: list[float | None] = []
     for first, last in pairwise((0.0, *problem.reference.breaks, length)):
         context.phase("seeking where the path must be cut")
         tool_path = _part(problem, first, last, len(pieces) == 0, problem.q_init)
         count = max(FEWEST, round(options.intervals * (last - first) / length))
         found, cuts = _cut(tool_path, count, options, rng)
+        if cuts != [] and problem.obstacles is not None and np.isfinite(found.spacing):
+            context.phase("seeking with how much clearance it could be followed")
+            widths.append(widest(tool_path, count, options.nodes, rng))
         if cuts is None:
-            return [_nothing(problem, found, first)]
+            return [_nothing(tool_path, found, first, _width(widths[-1:]))]
         pieces += _pieces(found, cuts, first, Manifold(tool_path))
-    words = _words(problem, pieces, found)
+    words = _words(problem, pieces, found, widths)
     solutions: list[Solution] = []
     transits = Transits(problem, rng)
     for number, piece in enumerate(pieces):
         context.phase(f"piece {number + 1} of {len(pieces)}")
         part = _part(problem, piece.start, piece.end, number == 0, piece.q)
-        best = plan(part, replace(options.planner, coarse_steps=len(piece.places) - 1), context, _Known(part, piece))[0]
+        known = _Known(part, piece) if len(piece.ways) else None
+        best = plan(part, replace(options.planner, coarse_steps=len(piece.places) - 1), context, known)[0]
         best = replace(best, method="segments", optimum=number + 1, reference=part.reference)
         best = replace(best, stretch=(piece.start, piece.end), evidence=words * (number == 0) + best.evidence)
         solutions.append(_after(solutions, best, transits) if solutions else best)
@@ -147,14 +153,13 @@ def _part(problem: Problem, start: float, end: float, first: bool, q: Array) -> 
 def _pieces(found: Components, cuts: list[tuple[int, int]], offset: float, manifold: Manifold) -> list[Piece]:
     ends = [0, *places_of(found, cuts), len(found.places) - 1]
     places, ranges = found.places + offset, [None, *((found.places[a], found.places[b]) for a, b in cuts)]
-    return [
-        Piece(
-            places[a : b + 1],
-            motions(found, a, b, manifold, WAYS),
-            None if between is None else (float(between[0] + offset), float(between[1] + offset)),
-        )
-        for (a, b), between in zip(pairwise(ends), ranges, strict=True)
-    ]
+    pieces = []
+    for (a, b), between in zip(pairwise(ends), ranges, strict=True):
+        ways = motions(found, a, b, manifold, WAYS)
+        begin = ways[0, 0] if len(ways) else found.nodes[a][0]
+        cut = None if between is None else (float(between[0] + offset), float(between[1] + offset))
+        pieces.append(Piece(places[a : b + 1], ways, np.asarray(begin), cut))
+    return pieces
 
 
 def _after(before: list[Solution], own: Solution, transits: Transits) -> Solution:
@@ -172,8 +177,8 @@ def _after(before: list[Solution], own: Solution, transits: Transits) -> Solutio
     return replace(own, approach=approach)
 
 
-def _words(problem: Problem, pieces: list[Piece], found: Components) -> str:
-    """Into how many pieces, where, and how well that is known."""
+def _words(problem: Problem, pieces: list[Piece], found: Components, widths: list[float | None]) -> str:
+    """Into how many pieces, where, how well that is known, and what clearance would leave it whole."""
     proven = np.isfinite(found.spacing)
     known = (
         f"by all loops of the self-motion manifold at {len(found.places)} places, nodes {found.spacing:.2g} rad apart"
@@ -187,16 +192,29 @@ def _words(problem: Problem, pieces: list[Piece], found: Components) -> str:
         return f"a continuous motion can follow {each}; "
     return (
         f"no continuous motion follows the path: {len(pieces)} pieces at least, cut between {', '.join(where)} along "
-        f"it ({known}); "
+        f"it ({known}); {_width(widths)}"
     )
 
 
-def _nothing(problem: Problem, found: Components, offset: float) -> Solution:
+def _width(widths: list[float | None]) -> str:
+    """What clearance would leave every tool path whole."""
+    if not widths:
+        return ""
+    if (least := min((-np.inf if width is None else width) for width in widths)) == -np.inf:
+        return "nor does one without the obstacles; "
+    if least < 0:
+        return f"all ways that lead on go {-least:.3g} m or more into the obstacles; "
+    return f"by that grid one would at obstacles.margin = {least:.4g} m; "
+
+
+def _nothing(problem: Problem, found: Components, offset: float, width: str) -> Solution:
     empty = [place for place, q in zip(found.places, found.nodes, strict=True) if not len(q)]
     message = (
         f"at {offset + empty[0]:.4g} m along the path no configuration found is within the limits and clear"
         if empty
         else "from some place of the path no configuration found leads on"
     )
+    barred = no_place(problem, np.linspace(0.0, problem.reference.duration, LOOKED + 1)) if empty else ""
+    message = "; ".join(filter(None, [message, barred, width.removesuffix("; ")]))
     standing = Trajectory(problem.times, np.tile(problem.q_init, (len(problem.times), 1)))
     return Solution("segments", standing, Status.INFEASIBLE, message, found=False)

@@ -2,7 +2,7 @@
 
 Two trees grow from both ends towards random configurations and each other (RRT-Connect, Kuffner and LaValle 2000); the
 way found is then shortened where a straight line will do. Along every straight leg s(t) is the quintic from rest to
-rest, in the least time that the limits of velocity and acceleration allow.
+rest, in the least time that the limits of velocity, acceleration, jerk, torque and power allow.
 """
 
 from __future__ import annotations
@@ -24,7 +24,10 @@ ROOM = 0.9  # of the margin: where a piece ends it may just be kept
 MOST = 2000  # configurations drawn
 SHORTCUTS = 60
 SAMPLES = 40  # of every leg
-PEAKS = 1.875, 10 / np.sqrt(3)  # of a quintic's velocity and acceleration, where distance and time are 1
+PEAKS = 1.875, 10 / np.sqrt(3), 60.0  # of a quintic's derivatives, where distance and time are 1
+BORNE = 0.99  # of torque and power limits, at so many moments of a leg: there may be more between them
+MOMENTS = 100
+NEARLY = 1.005  # times the least time of a leg
 USUAL = 1.0  # [rad/s] where nothing limits the velocity
 
 
@@ -84,23 +87,47 @@ class Transits:
                 way = [*way[: first + 1], *way[last:]]
         return way
 
-    def _timed(self, way: list[Array]) -> Trajectory:
-        bounds, arm = self.problem.bounds, self.problem.task.arm
-        own = arm.description.velocity
-        velocity = np.where(np.isfinite(own) & (own > 0), own, USUAL)
-        velocity = np.where(np.isfinite(bounds.velocity), bounds.velocity, velocity)
+    def _timed(self, way: list[Array]) -> Trajectory | None:
         times, rows = [0.0], [way[0]]
         for a, b in pairwise(way):
-            distance = np.abs(b - a)
-            least = max(
-                PEAKS[0] * (distance / velocity).max(), np.sqrt(PEAKS[1] * (distance / bounds.acceleration).max())
-            )
-            span = max(float(least), 1e-3)
+            span = self._least(a, b)
+            if not np.isfinite(span):
+                return None
             t = np.linspace(0.0, span, SAMPLES + 1)[1:]
             share = Quintic(span).sample(t, 1.0)[0]
             rows += list(a + share[:, None] * (b - a))
             times += list(times[-1] + t)
         return Trajectory(np.array(times), np.array(rows))
+
+    def _least(self, a: Array, b: Array) -> float:
+        """The least time [s] of a leg; infinite: already to hold the arm there takes more than it has."""
+        bounds, own, distance = self.problem.bounds, self.problem.task.arm.description.velocity, np.abs(b - a)
+        velocity = np.where(np.isfinite(own) & (own > 0), own, USUAL)
+        velocity = np.where(np.isfinite(bounds.velocity), bounds.velocity, velocity)
+        rates = zip(PEAKS, (velocity, bounds.acceleration, bounds.jerk), (1, 2, 3), strict=True)
+        short = max(1e-3, *(float((peak * distance / most).max() ** (1 / order)) for peak, most, order in rates))
+        if self._bears(a, b, short):
+            return short
+        if not self._bears(a, b, np.inf):
+            return np.inf
+        long = 2 * short
+        while not self._bears(a, b, long):
+            short, long = long, 2 * long
+        while long > NEARLY * short:
+            middle = (short + long) / 2
+            short, long = (short, middle) if self._bears(a, b, middle) else (middle, long)
+        return long
+
+    def _bears(self, a: Array, b: Array, span: float) -> bool:
+        """Whether a leg in the time `span` [s] keeps the limits of torque and power."""
+        bounds = self.problem.bounds
+        if not (np.isfinite(bounds.torque).any() or np.isfinite(bounds.power).any()):
+            return True
+        s, sd, sdd = (row[:, None] * (b - a) for row in Quintic(1.0).sample(np.linspace(0.0, 1.0, MOMENTS + 1), 1.0))
+        v = sd / span
+        tau = self.problem.task.arm.inverse_dynamics(a + s, v, sdd / span**2)
+        borne = (np.abs(tau) <= BORNE * bounds.torque) & (np.abs(tau * v) <= BORNE * bounds.power)
+        return bool(borne.all())
 
 
 @dataclass

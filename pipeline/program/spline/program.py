@@ -14,7 +14,7 @@ from pipeline.problem.lagrangian import trapezoid_weights
 from pipeline.problem.problem import Boundary, Problem
 from pipeline.program import ipopt
 from pipeline.program.program import Lifted
-from pipeline.program.scaling import POSITION_SCALE, Sums, scale
+from pipeline.program.scaling import POSITION_SCALE, Prices, Sums, scale
 from pipeline.program.spline.curve import Curve, integrals, stations
 
 SMALL = 3e-4  # of velocities and accelerations among the unknowns, relative to the guess's, with the kinetic energy
@@ -99,9 +99,17 @@ class Solved:
 class Spline(Lifted):
     """The unknowns, scaled for a solve that starts at `guess`."""
 
-    def __init__(self, problem: Problem, guess: Curve, tightened: Tightened, *, stretch: float | None = None) -> None:
+    def __init__(
+        self,
+        problem: Problem,
+        guess: Curve,
+        tightened: Tightened,
+        *,
+        stretch: float | None = None,
+        prices: Prices | None = None,
+    ) -> None:
         super().__init__(problem, guess.times, guess.q, keep_off=tightened.keep_off)
-        self.guess, self.tightened = guess, tightened
+        self.guess, self.tightened, self.prices = guess, tightened, prices
         self.tube = np.hstack([tightened.tolerance, tightened.orientation_tolerance])
         place, velocity, self.weights = stations(problem, guess)
         costs = integrals(problem, guess if stretch is None else guess.stretched(stretch))

@@ -15,6 +15,7 @@ from pipeline.program.feasibility import Violation
 from pipeline.program.spline.curve import Curve
 from pipeline.program.spline.program import Solved, Tightened
 from pipeline.program.spline.transcription import transcribe
+from pipeline.program.terms.tracking import INSIDE
 
 BETWEEN = 10  # points per interval
 
@@ -66,17 +67,30 @@ def excesses(problem: Problem, curve: Curve) -> dict[str, Array]:
 
 
 def _off_path(problem: Problem, moments: Array, q: Array) -> dict[str, Any]:
-    """By how much a path's tolerances are exceeded where it need not be kept exactly, each (K, 1)."""
+    """By how much a path's tolerances, less what the walls of its tube leave of them, are exceeded where it need not be
+    kept exactly, each (K, 1).
+    """
     reference = problem.reference
     if reference.exact:
         return {}
     error, count = problem.task.error(q, reference.position(moments)), len(problem.task.axes)
     kinds = {"tolerance": error[:, :count], "orientation_tolerance": error[:, count:]}
     return {
-        kind: np.linalg.norm(part, axis=1, keepdims=True) / allowed - 1
+        kind: peaks(moments, np.linalg.norm(part, axis=1))[:, None] / (allowed * (1 - INSIDE)) - 1
         for (kind, part), allowed in zip(kinds.items(), reference.tolerances, strict=True)
         if part.size
     }
+
+
+def peaks(moments: Array, values: Array) -> Array:
+    """The values (K,); those that their neighbours do not exceed, as the peak of the parabola through all three."""
+    h, slopes = np.diff(moments), np.diff(values) / np.diff(moments)
+    bend = np.diff(slopes) / (h[:-1] + h[1:])
+    slope = (slopes[:-1] * h[1:] + slopes[1:] * h[:-1]) / (h[:-1] + h[1:])
+    highest = (slopes[:-1] >= 0) & (slopes[1:] <= 0) & (bend < 0)
+    found = values.copy()
+    found[1:-1][highest] -= slope[highest] ** 2 / (4 * bend[highest])
+    return found
 
 
 def _pace(problem: Problem, q: Array, v: Array, a: Array) -> dict[str, Any]:
@@ -141,18 +155,18 @@ def tighten(
     solved again from there: from where it touches IPOPT may be long in finding another way round.
     """
     solved, further, tightened = first, [], Tightened.none(problem, first.curve.times)
-    loose = not first.program.forces
     for count in range(ROUNDS):
         posed, curve = solved.timed(problem).slowed(solved.stretch), solved.curve.stretched(solved.stretch)
         lacking = short(posed, curve)
         stricter = _stricter(posed, curve, tightened, 1.0 + count, lacking)
         if stricter is None or not solved.outcome.converged:
             break
-        tightened, loose = stricter, loose and keeps_forces(posed, curve)
+        tightened = stricter
         stretch = 0.0 if solved.program.stretch is None else solved.stretch
         start = begin if lacking and begin is not None else solved.curve
-        again = solved.timed(without_forces(problem) if loose else problem)
-        solved = transcribe(again, start, tightened, stretch=stretch).solve(**options)
+        lazy = not solved.program.forces and keeps_forces(posed, curve)
+        again = without_forces(solved.timed(problem)) if lazy else solved.timed(problem)
+        solved = transcribe(again, start, tightened, stretch=stretch, prices=solved.program.prices).solve(**options)
         further.append(solved)
     return solved, further
 

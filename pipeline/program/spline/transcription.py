@@ -22,6 +22,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from pipeline.problem.problem import Problem
+from pipeline.program.scaling import Prices
 from pipeline.program.spline import energy, law, rows, tool, torque
 from pipeline.program.spline.curve import Curve
 from pipeline.program.spline.program import Spline, Tightened
@@ -49,10 +50,19 @@ CHEAPEST: tuple[Term, ...] = (*COMMON, energy.velocities, torque.squares, energy
 SHORTEST: tuple[Term, ...] = (rows.shorten, *COMMON)
 
 
-def transcribe(problem: Problem, guess: Curve, tightened: Tightened | None = None, *, stretch: float = 0.0) -> Spline:
-    """The program of `problem` on the knots of `guess`, scaled for a solve that starts there; stretch: see above."""
+def transcribe(
+    problem: Problem,
+    guess: Curve,
+    tightened: Tightened | None = None,
+    *,
+    stretch: float = 0.0,
+    prices: Prices | None = None,
+) -> Spline:
+    """The program of `problem` on the knots of `guess`, scaled for a solve that starts there; stretch: see above.
+    prices: of a path that need not be kept exactly.
+    """
     tightened = Tightened.none(problem, guess.times) if tightened is None else tightened
-    program = Spline(problem, guess, tightened, stretch=stretch or None)
+    program = Spline(problem, guess, tightened, stretch=stretch or None, prices=prices)
     for term in SHORTEST if stretch else CHEAPEST:
         term(program)
     return program

@@ -9,11 +9,14 @@ import numpy as np
 from pydrake.solvers import QuadraticConstraint
 
 from pipeline.common.arrays import Array
+from pipeline.problem.lagrangian import trapezoid_weights
+from pipeline.program.ipopt import Outcome
 from pipeline.program.program import POSITIONS_PER_BINDING, Block, Lifted, blocks
-from pipeline.program.scaling import POSITION_SCALE
+from pipeline.program.scaling import POSITION_SCALE, Prices
 from pipeline.program.terms import base
 
-OFF_SCALE = 0.01  # of a departure by the whole tolerance: small, like the positions
+OFF_SCALE = 0.01  # of a departure by the whole tolerance where no prices are known: small, like the positions
+LEAST = 0.05  # of the largest price, where the path's is less
 INSIDE = 1e-6  # relative: by how much less than the tolerance, so that rounding does not exceed it
 
 Errors = Callable[[Array], tuple[Array, Array]]
@@ -34,26 +37,25 @@ def loosen(program: Lifted) -> None:
     """
     if program.problem.reference.exact:
         return
-    error, units = program.task.error(program.guess.q, program.x_ref), _units(program)
-    off = program.new("off", OFF_SCALE * error / units)
+    error, scales = program.task.error(program.guess.q, program.x_ref), _scales(program)
+    off = program.new("off", scales * error / _units(program))
     convex = QuadraticConstraint.HessianType.kPositiveSemidefinite
     count = len(program.task.axes)
     for part, width in zip((slice(0, count), slice(count, None)), program.tube.T, strict=True):
         size = off[0, part].size
-        for own, share in zip(off[program.first_free :, part], width[program.first_free :], strict=True):
-            if size:
-                form = np.eye(size) * 2 / (OFF_SCALE * share * (1 - INSIDE)) ** 2
-                ball = QuadraticConstraint(form, np.zeros(size), -np.inf, 1.0, convex)
-                program.drake.AddConstraint(ball, own)
+        for knot in range(program.first_free, len(off)) if size else ():
+            form = np.diag(2 / (scales[knot, part] * width[knot] * (1 - INSIDE)) ** 2)
+            ball = QuadraticConstraint(form, np.zeros(size), -np.inf, 1.0, convex)
+            program.drake.AddConstraint(ball, off[knot, part])
 
 
 def hold(program: Lifted, knots: Block, errors: Errors, unknowns: Any, pattern: list[tuple[int, int]]) -> None:
     """errors(x), all m of every one of the knots, with their Jacobian, are zero, or the departures allowed there."""
     m, count, zero = program.task.m, len(knots), np.zeros(len(knots) * program.task.m)
     if program.problem.reference.exact:
-        program.add_rows(errors, zero, unknowns, pattern)
+        program.followed.append((knots, program.add_rows(errors, zero, unknowns, pattern)))
         return
-    split, units = len(unknowns), np.tile(_units(program) / OFF_SCALE, count)
+    split, units = len(unknowns), (_units(program) / _scales(program)[knots]).ravel()
     own = np.diag(-units)
 
     def less(x: Array) -> tuple[Array, Array]:
@@ -68,6 +70,30 @@ def _units(program: Lifted) -> Array:
     """The tolerance of each of the m errors [m or rad]."""
     count = len(program.task.axes)
     return np.repeat(program.problem.reference.tolerances, (count, program.task.m - count))
+
+
+def prices(program: Lifted, outcome: Outcome) -> Prices:
+    """The path's prices where a program that keeps it exactly ended: the size of its rows' multipliers."""
+    found, count = np.zeros((len(program.times), program.task.m)), len(program.task.axes)
+    for knots, binding in program.followed:
+        found[knots] = outcome.result.GetDualSolution(binding).reshape(len(knots), -1)
+    sizes = [np.linalg.norm(part, axis=1) for part in (found[:, :count], found[:, count:])]
+    return Prices(program.times, np.transpose(sizes) / trapezoid_weights(program.times)[:, None])
+
+
+def _scales(program: Lifted) -> Array:
+    """What departures by the whole tolerance are among the unknowns (N + 1, m).
+
+    IPOPT's Hessians start as the identity. Where the objective falls by p |e| with a departure, the wall |e|^2 <= 1 has
+    the multiplier p / 2, and the Lagrangian the Hessian p in e: the root of p makes that the identity too.
+    """
+    if program.prices is None:
+        return np.full((len(program.times), program.task.m), OFF_SCALE)
+    falls = program.prices.at(program.times) * program.problem.reference.tolerances
+    roots = np.sqrt(np.maximum(falls, LEAST * falls.max(axis=0)))
+    count = len(program.task.axes)
+    scales: Array = np.repeat(np.where(roots > 0, roots, OFF_SCALE), (count, program.task.m - count), axis=1)
+    return scales
 
 
 def _at(program: Lifted, knots: Block) -> None:
