@@ -57,7 +57,7 @@ def _passed(report: Report, exported: Resampled) -> str:
     best = next(e for e in report.motions.evaluations if exported.before[0].is_of(e))
     sent_one = next(e for e in report.motions.evaluations if exported.is_of(e))
     problem = report.motions.problem
-    less = f"{100 * saving(problem, best, sent_one):.2g} % less {COSTS.get(weighs(problem), 'of the objective')}"
+    less = f"{percent(saving(problem, best, sent_one))} % less {COSTS.get(weighs(problem), 'of the objective')}"
     return f" {called(best)} would take {less}, but {exported.before[0].fault}. {exported.instead}".rstrip()
 
 
@@ -104,6 +104,11 @@ def saving(problem: Problem, e: Evaluation, against: Evaluation) -> float:
     return 1 - own / other if other > 0 else 0.0
 
 
+def percent(share: float) -> str:
+    """A share in percent, with two digits or all before the point."""
+    return f"{100 * share:.0f}" if abs(share) >= 0.995 else f"{100 * share:.2g}"
+
+
 def weighs(problem: Problem) -> str:
     """The integral that is minimised, or the kinetic energy where several or other things are."""
     names = [name for name, weight in problem.objective.weights.items() if weight]
@@ -139,7 +144,7 @@ def _against(report: Report, e: Evaluation) -> str:
     if other is None or other is e:
         return ""
     saved, what = saving(problem, e, other), COSTS.get(weighs(problem), f"of the {weighs(problem)} integral")
-    share = f"{100 * abs(saved):.2g} % {'less' if saved >= 0 else 'more'} {what} than {METHODS[other.method].title}"
+    share = f"{percent(abs(saved))} % {'less' if saved >= 0 else 'more'} {what} than {METHODS[other.method].title}"
     beyond = exceeded(other)
     return share + (f" (which exceeds {', '.join(beyond)})" if beyond else "")
 

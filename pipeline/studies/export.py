@@ -139,6 +139,8 @@ def instead(motions: Motions, refused: Sequence[Resampled]) -> str:
         said.append(f"{' '.join(words)} makes the planner seek one that can be{shipped}.")
     elif not any(problem.rest) and unserved(problem) is None and not all(motion.keeps_limits for motion in refused):
         said.append("method.global.transcription=spline keeps the limits between the knots too.")
+    elif not all(problem.rest) and (why := unserved(problem)):
+        said.append(f"No start from rest is sought where {why}.")
     for motion in refused:
         off = float(f"{1.1 * motion.tracking_error:.1e}")
         if len(motion.faults) == 1 and motion.strays:

@@ -12,7 +12,7 @@ from pipeline.artifacts.markdown import PEAK, markdown
 from pipeline.artifacts.report import Report
 from pipeline.artifacts.summary import summary
 from pipeline.artifacts.table import rows
-from pipeline.artifacts.verdict import first, status, verdict
+from pipeline.artifacts.verdict import first, percent, status, verdict
 from pipeline.config.documents import Printed
 from pipeline.problem.solution import Status
 from pipeline.studies import export
@@ -118,6 +118,10 @@ def test_a_motion_within_its_limits_comes_before_a_cheaper_one(report: Report) -
     dear = replace(other, objective=9.0, limit_excess={}, limit_excess_between={})
     assert good.objective < 9
     assert first(report_of(problem, [good, dear])) is dear
+
+
+def test_shares_are_no_powers_of_ten() -> None:
+    assert [percent(share) for share in (0.316, -0.0123, 0.994, 1.13, -0.9999)] == ["32", "-1.2", "99", "113", "-100"]
 
 
 def test_the_table_of_motions(report: Report) -> None:

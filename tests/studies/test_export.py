@@ -201,6 +201,8 @@ def test_a_jump_of_velocity_is_not_sent(line: Case, at_rest: Case) -> None:
         == "boundary.rest=[start,end] makes the planner seek one that can be, and so does +experiment=sim3_sendable. "
     )
     assert instead(Motions(third, replace(at_rest[0], rest=(True, True)), ()), ()) == ""
+    bounded = replace(at_rest[0], rest=(False, False), bounds_of_integrals={"torque": 1.0})
+    assert instead(Motions(third, bounded, ()), ()) == "No start from rest is sought where integrals are bounded. "
 
 
 def test_a_motion_that_ends_while_it_moves_or_off_its_path_is_not_sent(at_rest: Case) -> None:
