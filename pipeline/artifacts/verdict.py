@@ -11,7 +11,7 @@ from pipeline.methods.registry import METHODS
 from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Status
 from pipeline.studies.estimate import Estimate
-from pipeline.studies.export import TOLERANCE, Nothing, Resampled
+from pipeline.studies.export import TOLERANCE, Nothing, Resampled, as_shown
 
 BASELINES = ("lsv", "inertia_weighted")
 COSTS = {"kinetic_energy": "energy", "torque": "squared torque"}  # what is saved, by the integral
@@ -25,7 +25,7 @@ def sent(report: Report) -> Evaluation | None:
 
 def first(report: Report) -> Evaluation | None:
     """The motion to look at first: that to send, else the cheapest within its limits; None if no method found any."""
-    solved = sorted(report.motions.solved, key=lambda e: (bool(exceeded(e)), e.objective))
+    solved = sorted(report.motions.solved, key=lambda e: (bool(exceeded(e)), as_shown(e)))
     found = [e for e in report.motions.evaluations if e.solution.found]
     return sent(report) or next(iter([*solved, *found]), None)
 

@@ -161,6 +161,13 @@ def test_the_best_motion_is_the_cheapest_that_hits_nothing() -> None:
     assert isinstance(sent, Resampled)
     assert sent.method == "global"
     assert sent.limit_excess["clearance"] <= 0
+    for cheaper, best in ((1e-7, 1), (1e-3, 2)):  # what a table does not show is not preferred
+        other = replace(
+            around, objective=around.objective * (1 - cheaper), solution=replace(around.solution, optimum=2)
+        )
+        sent = sent_by(there, config, around, other)
+        assert isinstance(sent, Resampled)
+        assert sent.optimum == best
     nothing = sent_by(there, config, through)
     assert nothing is not None
     assert nothing.section()[0].startswith("Exported: nothing")
