@@ -19,6 +19,7 @@ from pipeline.model.arm import Arm
 from pipeline.model.places import Places
 from pipeline.problem.problem import Problem
 from pipeline.robot.shapes import Shape
+from pipeline.robot.touching import groups
 
 POINTS = 201  # of the path
 SMALLEST, THIN = 0.04, 0.1  # [m] of an edge; of the height of a planar arm's base, relative
@@ -39,6 +40,16 @@ def around(problem: Problem, points: Array) -> tuple[Shape, ...]:
     every = np.concatenate([points.reshape(-1, 3), np.reshape(own, (-1, 3))])
     every = every[np.isfinite(every).all(axis=1)]
     return tuple(_plate(shape, every) if shape.kind == "half_space" else shape for shape in shapes)
+
+
+def limbs(problem: Problem) -> tuple[Shape, ...]:
+    """The other limbs of the base, in the world: they stand still, and the line through the arm's joints shows none."""
+    arm, own = problem.task.arm, problem.own
+    if own is None or own.unknown or arm.base.count:
+        return ()
+    joints, at = groups(arm.description), Places(arm)(np.zeros(arm.n))
+    found = [shape for shape in arm.description.collision if shape.frame in arm.description.aside]
+    return tuple(shape.moved(*at[str(shape.frame)]) for shape in found if joints[str(shape.frame)] == 0)
 
 
 def _plate(shape: Shape, points: Array) -> Shape:

@@ -57,7 +57,7 @@ def _said(close: Close) -> str:
     if close.kind == "clearance":
         return (
             f"{close.first} is {close.distance:.3g} m from obstacle {close.second}, less than obstacles.margin = "
-            f"{close.margin:g} m"
+            f"{close.margin:g} m (collision.allow=[[{close.first},{close.second}]] lets them touch)"
         )
     return (
         f"{close.first} is {close.distance:.3g} m from {close.second}, less than collision.margin = {close.margin:g} m "

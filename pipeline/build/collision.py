@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +18,7 @@ from pipeline.model.places import Places
 from pipeline.problem.problem import Problem
 from pipeline.robot.packages import find
 from pipeline.robot.separation import Solid, depth, distance, solids_of
+from pipeline.robot.shapes import Shape
 from pipeline.robot.touching import Pair, apart, disabled, groups
 
 ANGLES = 128  # of the first joint at which a path is compared with what it carries
@@ -70,7 +72,9 @@ def require_free_path(problem: Problem) -> None:
     path = problem.reference.geometry.sample(s)[0]
     tools = [link for link in solids if carried[link] == arm.n]
     for shape in () if problem.obstacles is None else problem.obstacles.shapes:
-        _refuse(f"obstacle {shape.name}", depth(Solid.of(shape), path), s, around.tool(tools))
+        kept = [tool for tool in tools if problem.obstacles is not None and problem.obstacles.keeps(tool, shape)]
+        if kept:
+            _refuse(f"obstacle {shape.name}", depth(Solid.of(shape), path), s, around.tool(kept))
     for link in solids:
         touching = [tool for tool in tools if (link, tool) in pairs]
         if carried[link] <= 1 and touching:
@@ -123,13 +127,26 @@ def in_space(arm: Arm) -> bool:
     return bool(chain.slides.any() or (np.abs(chain.turn[1:, 2, 2]) < 1 - 1e-9).any())
 
 
+def may_touch(collision: CollisionConfig, arm: Arm, shapes: Collection[Shape]) -> frozenset[tuple[str, str]]:
+    """The links and obstacles of collision.allow; raises ConfigError for a name that neither a link nor an obstacle
+    has, and for two obstacles.
+    """
+    links, solids = arm.description.links, {shape.name for shape in shapes}
+    found = set()
+    for pair in collision.allow:
+        for name in pair:
+            if name not in (*links, *solids):
+                close = difflib.get_close_matches(name, (*links, *solids), n=3, cutoff=0.4) or list(links)[:12]
+                raise ConfigError(f"collision.allow: no link is called {name}; did you mean {', '.join(close)}?")
+        if not set(pair) & set(links):
+            raise ConfigError(f"collision.allow: {pair[0]} and {pair[1]} are both obstacles; one must be a link")
+        found |= {(link, solid) for link, solid in (pair, pair[::-1]) if link in links and solid in solids}
+    return frozenset(found)
+
+
 def _allowed(collision: CollisionConfig, arm: Arm, srdf: str | None) -> set[frozenset[str]]:
     links = arm.description.links
-    for link in (link for pair in collision.allow for link in pair):
-        if link not in links:
-            close = difflib.get_close_matches(link, links, n=3, cutoff=0.4) or list(links)[:12]
-            raise ConfigError(f"collision.allow: no link is called {link}; did you mean {', '.join(close)}?")
-    given = {frozenset(pair) for pair in collision.allow}
+    given = {frozenset(pair) for pair in collision.allow if set(pair) <= set(links)}
     key, file = ("robot.srdf", srdf) if collision.srdf is None else ("collision.srdf", collision.srdf)
     return given if file in (None, "none") else given | disabled(find(str(file), key), key)
 
@@ -166,9 +183,11 @@ def too_near(problem: Problem, q: Array) -> bool:
     placed = {link: [solid.moved(*at[link]) for solid in of_link] for link, of_link in solids.items()}
     around, own, carried = problem.obstacles, problem.own, groups(problem.task.arm.description)
     if around is not None:
-        moving = [solid for link, of_link in placed.items() if carried[link] for solid in of_link]
-        if _near(moving, [Solid.of(shape) for shape in around.shapes], around.margin):
-            return True
+        others = [(shape, Solid.of(shape)) for shape in around.shapes]
+        for link, of_link in placed.items():
+            kept = [solid for shape, solid in others if around.keeps(link, shape)]
+            if carried[link] and _near(of_link, kept, around.margin):
+                return True
     pairs = own.pairs if own is not None and own.kept else ()
     return own is not None and any(_near(placed[first], placed[second], own.margin) for first, second in pairs)
 

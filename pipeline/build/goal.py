@@ -6,11 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from pipeline.build.collision import may_touch
 from pipeline.build.robot import make_shape
 from pipeline.common.arrays import Array
 from pipeline.common.errors import ConfigError
 from pipeline.config.goal import LimitsConfig, WeightedConfig
-from pipeline.config.robot import ObstaclesConfig
+from pipeline.config.robot import CollisionConfig, ObstaclesConfig
 from pipeline.config.run import RunConfig
 from pipeline.model.arm import Arm
 from pipeline.model.obstacles import Obstacles
@@ -85,15 +86,17 @@ def make_objective(config: RunConfig, arm: Arm) -> Objective:
     return Objective(own.weights, Secondary(own.criteria, own.k0, ranges.lower, ranges.upper))
 
 
-def make_obstacles(obstacles: ObstaclesConfig, arm: Arm) -> Obstacles | None:
-    if not obstacles.any:
-        return None
-    if not arm.description.collision:
-        raise ConfigError(f"obstacles: {arm.description.name} has no collision shapes; give them in robot.collision")
+def make_obstacles(obstacles: ObstaclesConfig, collision: CollisionConfig, arm: Arm) -> Obstacles | None:
+    """The solids around the arm, None where there are none, and which of its links may touch which of them."""
     shapes = [make_shape(name, shape) for name, shape in obstacles.shapes.items()]
     if obstacles.file is not None:
         shapes += world.read(find(obstacles.file, "obstacles.file"))
     if obstacles.floor is not None:
         x, y, _ = arm.mounting.base_position
         shapes.append(Shape("floor", "half_space", SLAB, (x, y, obstacles.floor)))
-    return Obstacles(tuple(shapes), obstacles.margin, obstacles.influence)
+    allowed = may_touch(collision, arm, shapes)
+    if not shapes:
+        return None
+    if not arm.description.collision:
+        raise ConfigError(f"obstacles: {arm.description.name} has no collision shapes; give them in robot.collision")
+    return Obstacles(tuple(shapes), obstacles.margin, obstacles.influence, allowed)

@@ -40,7 +40,7 @@ def prepare(config: RunConfig) -> Problem:
         objective=make_objective(config, arm),
         limits=make_limits(config.limits, arm, config.robot.limits if any(rest) else None),
         boundary=Boundary(config.boundary.kind),
-        obstacles=make_obstacles(config.obstacles, arm),
+        obstacles=make_obstacles(config.obstacles, config.collision, arm),
         own=make_own(config.collision, arm, robot.srdf),
         rest=rest,
         zero_acceleration=config.boundary.zero_acceleration,

@@ -225,5 +225,6 @@ class CollisionConfig:
         ),
     ] = None
     allow: Annotated[
-        tuple[Pair, ...], Field(description="[[link, link], ...] that may touch, besides those of the SRDF")
+        tuple[Pair, ...],
+        Field(description="[[link, link or obstacle], ...] that may touch, besides those of the SRDF"),
     ] = ()

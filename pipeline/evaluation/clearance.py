@@ -69,10 +69,15 @@ class Clearance:
                 body = self._plant.GetBodyByName(arm.description.drake_name(link), parts.model)
                 links.setdefault(link, []).append(self._add(body, shape, link, carried[link]))
         world = self._plant.world_body()
-        others = [self._add(world, shape, shape.name, 0) for shape in around]
+        others = [(self._add(world, shape, shape.name, 0), shape) for shape in around]
         self._plant.Finalize()
         moving = [body for link in links.values() for body in link if body.joints]
-        self.obstacles = [Pair(other, body) for body in moving for other in others]
+        self.obstacles = [
+            Pair(other, body)
+            for body in moving
+            for other, shape in others
+            if obstacles is not None and obstacles.keeps(body.name, shape)
+        ]
         self.own = [Pair(a, b) for one, two in pairs for a in links.get(one, []) for b in links.get(two, [])]
         self.joints = parts.joints
         self._order = [joint.position_start() for joint in parts.joints]  # those of velocities too: one each

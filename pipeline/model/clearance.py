@@ -64,6 +64,7 @@ class Clearance:
         for body, shape in zip(bodies, shapes, strict=True):
             self.links.setdefault(str(shape.frame), []).append(self._register(body, shape, str(shape.frame)))
         others = [self._register(self.plant.world_body(), shape, shape.name) for shape in solids]
+        self.others = dict(zip(others, solids, strict=True))
         self.plant.Finalize()
         self.diagram = builder.Build()
         every = [geometry for link in self.links.values() for geometry in link]
@@ -71,6 +72,9 @@ class Clearance:
         # Drake leaves out pairs that cannot move against each other: the base and the obstacles.
         if obstacles is not None and solids and not all(self.plant.IsAnchored(body) for body in bodies):
             within = CollisionFilterDeclaration().ExcludeWithin(GeometrySet(every))
+            for link, own_solids in self.links.items():
+                may = [one for one, shape in self.others.items() if not obstacles.keeps(link, shape)]
+                within.ExcludeBetween(GeometrySet(own_solids), GeometrySet(may))
             self.kinds.append(self._kind("clearance", obstacles.margin, obstacles.influence, within))
         if own is not None and pairs:
             only = CollisionFilterDeclaration().ExcludeWithin(GeometrySet([*every, *others]))

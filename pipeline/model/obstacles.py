@@ -10,12 +10,17 @@ from pipeline.robot.shapes import Shape
 @dataclass(frozen=True)
 class Obstacles:
     """Solids in the world, the least distance [m] that moving links must keep from them, and from how much farther on
-    [m] they are felt by the solver.
+    [m] they are felt by the solver. allowed: links and solids by name that may touch.
     """
 
     shapes: tuple[Shape, ...]
     margin: float
     influence: float = 0.05
+    allowed: frozenset[tuple[str, str]] = frozenset()
+
+    def keeps(self, link: str, shape: Shape) -> bool:
+        """Whether a link has to be clear of a solid."""
+        return (link, shape.name) not in self.allowed
 
 
 @dataclass(frozen=True)

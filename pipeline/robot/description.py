@@ -36,6 +36,7 @@ class Description:
     the root link, empty if one can.
     base_coordinates: how many of the joints, the first ones, are not the arm's but move its base (`spacecraft.py`), and
     root: the link of the xml that they start from. tool: the link of what is fixed to the end effector; empty: nothing.
+    aside: the links of other limbs, which joints off the chain carry that are held.
     """
 
     name: str
@@ -58,6 +59,7 @@ class Description:
     base_coordinates: int = 0
     root: str = ""
     tool: str = ""
+    aside: frozenset[str] = frozenset()
 
     @property
     def attached(self) -> tuple[Shape, ...]:

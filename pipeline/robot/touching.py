@@ -34,14 +34,15 @@ def groups(description: Description) -> dict[str, int]:
 
 def apart(description: Description) -> list[Pair]:
     """The pairs of links with shapes between which two or more joints move, nearer the base first; of what is fixed to
-    the end effector all those that a joint moves it against.
+    the end effector, and of the base's other limbs, all those that a joint moves against them.
     """
     own, tool = groups(description), description.tool
+    limbs = {link for link in description.aside if own[link] == 0}
     links = sorted({str(shape.frame) for shape in description.collision}, key=lambda link: own[link])
     return [
         (first, second)
         for first, second in combinations(links, 2)
-        if own[second] - own[first] > (0 if tool in (first, second) else 1)
+        if own[second] - own[first] > (0 if tool in (first, second) or first in limbs else 1)
     ]
 
 

@@ -60,6 +60,8 @@ def read(
         )
         for name, value in locked.items()
     )
+    limbs = [joint for joint in tree.joints.values() if joint.kind != "fixed" and joint not in chain]
+    aside = {link for joint in limbs for link in tree.group(joint.child, set())}
     for name, position in positions.items():
         _freeze(tree, tree.joints[name], position)
     moving = [joint for joint in chain if joint.name not in positions]
@@ -99,6 +101,7 @@ def read(
         held=held,
         notes=tuple(tree.notes),
         root_fault=root_fault,
+        aside=frozenset(aside),
     )
 
 

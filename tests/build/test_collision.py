@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.build.collision import in_space, make_own
+from pipeline.build.collision import in_space, make_own, may_touch
 from pipeline.build.problem import prepare
 from pipeline.build.robot import load
 from pipeline.common.errors import ConfigError, PathError, RobotError
@@ -64,7 +64,7 @@ def test_an_srdf_and_pairs_of_ones_own(tmp_path: Path) -> None:
     with pytest.raises(RobotError, match=r"collision\.srdf = .*none\.srdf: no such file"):
         make_own(CollisionConfig(srdf=str(tmp_path / "none.srdf")), robot("panda"))
     with pytest.raises(ConfigError, match=r"collision\.allow: no link is called hand; did you mean panda_hand"):
-        make_own(CollisionConfig(allow=(("hand", "panda_link5"),)), robot("panda"))
+        may_touch(CollisionConfig(allow=(("hand", "panda_link5"),)), robot("panda"), ())
 
 
 def test_a_start_that_collides_names_the_pair_and_the_key() -> None:

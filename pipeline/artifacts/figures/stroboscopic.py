@@ -14,7 +14,7 @@ from matplotlib.ticker import MaxNLocator
 
 from pipeline.artifacts.figures import solids
 from pipeline.artifacts.figures.panels import EVENT, INK, PALE, PATH, new_figure, shape_of, thin, tidy
-from pipeline.artifacts.scene import around, carried, outlines
+from pipeline.artifacts.scene import around, carried, limbs, outlines
 from pipeline.evaluation.evaluation import Evaluation
 from pipeline.model.arm import Arm
 from pipeline.model.task import AXES
@@ -47,6 +47,10 @@ def stroboscopic(problem: Problem, evaluations: Sequence[Evaluation], name: str)
     for shape in obstacles:
         corners = solids.surface(shape)
         low, high = np.minimum(low, corners.min(axis=0)), np.maximum(high, corners.max(axis=0))
+    beside = () if planar else limbs(problem)
+    for shape in beside:
+        corners = solids.surface(shape)
+        low, high = np.minimum(low, corners.min(axis=0)), np.maximum(high, corners.max(axis=0))
     low, high = low[dims] - margin, high[dims] + margin
     rows, columns = shape_of(len(evaluations))
     width = 4.4 if columns < 4 else 3.4
@@ -70,6 +74,8 @@ def stroboscopic(problem: Problem, evaluations: Sequence[Evaluation], name: str)
             axes.plot(*e.skeleton[k][:, dims].T, "o-", color=shade, linewidth=1.7, markersize=2.8, zorder=2 + usable)
             for edge in edges[i : i + 1]:
                 axes.plot(*edge[k][:, dims].T, color=shade, linewidth=1.2, zorder=1.5 + usable)
+        for shape in beside:
+            solids.draw(axes, shape, dims, solids.GROUND)
         for held in tools[i]:
             solids.draw(axes, held, dims, to_hex(TIME_RAMP(0.5)))
         axes.plot(*e.position[thin(e.time)][:, dims].T, color=PATH, linewidth=1.4, zorder=4)

@@ -14,7 +14,7 @@ import numpy as np
 from pipeline.artifacts.bands import Band, bands
 from pipeline.artifacts.figures.solids import surface
 from pipeline.artifacts.report import Report
-from pipeline.artifacts.scene import around, corners, hull, path_in_world, tool_poses
+from pipeline.artifacts.scene import around, corners, hull, limbs, path_in_world, tool_poses
 from pipeline.artifacts.table import rows
 from pipeline.artifacts.verdict import first, verdict, weighs
 from pipeline.common.arrays import Array
@@ -48,6 +48,7 @@ def run(report: Report) -> dict[str, Any]:
         "foot": None if arm.base.count else list(arm.mounting.base_position),
         "path": packed(path_in_world(problem)),
         "obstacles": [_solid(shape) for shape in around(problem, points)],
+        "limbs": [_solid(shape) for shape in limbs(problem)],
         "tool": [_solid(shape) for shape in arm.description.attached],
         "flat": _flat(problem, own),
         "table": table,

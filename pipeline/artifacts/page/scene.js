@@ -50,7 +50,7 @@ function makeScene(canvas, runs, motions) {
     runs.forEach((run) => {
       all(run.path, 3);
       if (run.foot) take(run.foot, 0);
-      run.obstacles.forEach((o) =>
+      [...run.obstacles, ...run.limbs].forEach((o) =>
         o.ends ? o.ends.forEach((p) => take(p, o.radius)) : o.corners.forEach((p) => take(p, 0)),
       );
     });
@@ -145,12 +145,14 @@ function makeScene(canvas, runs, motions) {
       under = (_, paint) => solid(-1e9, paint);
     runs.forEach((run, i) => {
       if (!seen.has(i)) return;
-      run.obstacles.forEach((o) => {
+      const stands = (o, color, alpha) => {
         if (o.ends) {
           const [a, b] = o.ends.map(project);
-          solid((a.depth + b.depth) / 2, () => line(o.ends, SOLID, 2 * o.radius * a.scale, 0.45));
-        } else box(o.corners, o.ground ? GROUND : SOLID, o.ground ? 0.18 : 0.35, o.ground ? under : solid, pen, o.faces);
-      });
+          solid((a.depth + b.depth) / 2, () => line(o.ends, color, 2 * o.radius * a.scale, alpha + 0.1));
+        } else box(o.corners, color, alpha, o.ground ? under : solid, pen, o.faces);
+      };
+      run.obstacles.forEach((o) => (o.ground ? stands(o, GROUND, 0.18) : stands(o, SOLID, 0.35)));
+      run.limbs.forEach((o) => stands(o, GROUND, 0.25));
     });
     shown.forEach((m) => {
       const own = m === focus,

@@ -27,6 +27,7 @@ def picture(description: Description) -> tuple[str, list[str]]:
     if root.tag != "robot":
         return "", [f"the pictures of a file with <{root.tag}> are not drawn"]
     _drop_foreign(root)
+    _split_planar(root, description)
     parents = {parent.get("link") for parent in root.iterfind("joint/parent")}
     if "world" in parents - {link.get("name") for link in root.findall("link")}:
         root.insert(0, ET.Element("link", name="world"))
@@ -50,6 +51,20 @@ def picture(description: Description) -> tuple[str, list[str]]:
     named = missing[0] + ", ..." * (len(missing) > 1)
     note = f"{count} of {description.file.name} not found, drawn without ({named})"
     return ET.tostring(root, encoding="unicode"), [note]
+
+
+def _split_planar(root: ET.Element, description: Description) -> None:
+    """Put the three joints that a planar one is read as, and the links between them, in its place."""
+    reduced = ET.fromstring(description.xml)
+    for planar in [joint for joint in root.findall("joint") if joint.get("type") == "planar"]:
+        root.remove(planar)
+        own = {f"{planar.get('name')}_{axis}" for axis in ("x", "y", "yaw")}
+        named = {"joint": own, "link": {f"{name}_link" for name in own}}
+        for part in reduced:
+            if part.get("name") in named.get(part.tag, ()):
+                if part.get("type") == "prismatic":
+                    ET.SubElement(part, "limit", lower="-1e9", upper="1e9", velocity="1e9", effort="1e9")
+                root.append(part)
 
 
 def _drop_foreign(root: ET.Element) -> None:
