@@ -6,7 +6,7 @@ import numpy as np
 
 from pipeline.artifacts.bands import closest
 from pipeline.artifacts.report import Report
-from pipeline.artifacts.verdict import baseline, saving, sent, status, weighs
+from pipeline.artifacts.verdict import baseline, percent, saving, sent, status, weighs
 from pipeline.methods.registry import METHODS
 from pipeline.studies.front import Front, cost, unit
 
@@ -29,7 +29,8 @@ def rows(report: Report) -> list[dict[str, str]]:
         if against is not None:
             known = found and e.solution.event_time is None and e is not against
             saved = saving(problem, e, against) if known else 0.0
-            row[f"vs {METHODS[against.method].title}"] = f"{-100 * saved:+.2g} %" if known else ""
+            more = f"{'+' if saved <= 0 else ''}{percent(-saved)} %"
+            row[f"vs {METHODS[against.method].title}"] = more if known else ""
         near = closest(problem, e) if found and e.solution.event_time is None else None
         row["closest limit"] = "" if near is None else near.brief
         clear = min(e.clearance.min(), e.clearance_between)

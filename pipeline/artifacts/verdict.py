@@ -11,7 +11,7 @@ from pipeline.methods.registry import METHODS
 from pipeline.problem.problem import Problem
 from pipeline.problem.solution import Status
 from pipeline.studies.estimate import Estimate
-from pipeline.studies.export import TOLERANCE, Nothing, Resampled
+from pipeline.studies.export import TOLERANCE, Nothing, Resampled, as_shown
 
 BASELINES = ("lsv", "inertia_weighted")
 COSTS = {"kinetic_energy": "energy", "torque": "squared torque"}  # what is saved, by the integral
@@ -25,7 +25,7 @@ def sent(report: Report) -> Evaluation | None:
 
 def first(report: Report) -> Evaluation | None:
     """The motion to look at first: that to send, else the cheapest within its limits; None if no method found any."""
-    solved = sorted(report.motions.solved, key=lambda e: (bool(exceeded(e)), e.objective))
+    solved = sorted(report.motions.solved, key=lambda e: (bool(exceeded(e)), as_shown(e)))
     found = [e for e in report.motions.evaluations if e.solution.found]
     return sent(report) or next(iter([*solved, *found]), None)
 
@@ -56,8 +56,9 @@ def _passed(report: Report, exported: Resampled) -> str:
         return ""
     best = next(e for e in report.motions.evaluations if exported.before[0].is_of(e))
     sent_one = next(e for e in report.motions.evaluations if exported.is_of(e))
-    less = 100 * saving(report.motions.problem, best, sent_one)
-    return f" {called(best)} would take {less:.2g} % less, but {exported.before[0].fault}. {exported.instead}".rstrip()
+    problem = report.motions.problem
+    less = f"{percent(saving(problem, best, sent_one))} % less {COSTS.get(weighs(problem), 'of the objective')}"
+    return f" {called(best)} would take {less}, but {exported.before[0].fault}. {exported.instead}".rstrip()
 
 
 def _pieces(report: Report) -> str:
@@ -103,6 +104,11 @@ def saving(problem: Problem, e: Evaluation, against: Evaluation) -> float:
     return 1 - own / other if other > 0 else 0.0
 
 
+def percent(share: float) -> str:
+    """A share in percent, with two digits or all before the point."""
+    return f"{100 * share:.0f}" if abs(share) >= 0.995 else f"{100 * share:.2g}"
+
+
 def weighs(problem: Problem) -> str:
     """The integral that is minimised, or the kinetic energy where several or other things are."""
     names = [name for name, weight in problem.objective.weights.items() if weight]
@@ -138,7 +144,7 @@ def _against(report: Report, e: Evaluation) -> str:
     if other is None or other is e:
         return ""
     saved, what = saving(problem, e, other), COSTS.get(weighs(problem), f"of the {weighs(problem)} integral")
-    share = f"{100 * abs(saved):.2g} % {'less' if saved >= 0 else 'more'} {what} than {METHODS[other.method].title}"
+    share = f"{percent(abs(saved))} % {'less' if saved >= 0 else 'more'} {what} than {METHODS[other.method].title}"
     beyond = exceeded(other)
     return share + (f" (which exceeds {', '.join(beyond)})" if beyond else "")
 

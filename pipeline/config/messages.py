@@ -34,7 +34,12 @@ def in_one_line(error: ValidationError, schema: Node, where: str = "") -> str:
         key, value = _joined(key, "kind"), value.get("kind")
         return f"{key} = {shown(value)}: {_hint(value, choice)}allowed: {', '.join(choice)}"
     about = "" if _speaks_for_itself(schema, node) else f" ({meaning(node)[1]})"
-    return f"{key} = {shown(value)}: {_hint(value, node.get('enum', ()))}{_allowed(schema, node)}{about}"
+    return f"{key} = {shown(value)}: {_hint(value, _words(node))}{_allowed(schema, node)}{about}"
+
+
+def _words(node: Node) -> list[Any]:
+    """The words that may stand there, alone or beside other things."""
+    return [word for one in (node, *node.get("anyOf", ())) for word in one.get("enum", ())]
 
 
 def unknown_key(key: str, allowed: Iterable[str]) -> str:
@@ -42,8 +47,9 @@ def unknown_key(key: str, allowed: Iterable[str]) -> str:
     now = renamed(key)
     if now is not None:
         return f"{key}: {now}"
-    hint = _hint(key.rpartition(".")[2], allowed)
-    return f"{key}: unknown key; {hint}allowed: {', '.join(sorted(allowed))}"
+    allowed = sorted(allowed)
+    hint = next(filter(None, (_hint(part, allowed) for part in reversed(key.split(".")))), "")
+    return f"{key}: unknown key; {hint}allowed: {', '.join(allowed)}"
 
 
 def unknown_option(group: str, option: str, allowed: Sequence[str]) -> str:

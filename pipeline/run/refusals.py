@@ -7,6 +7,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from typing import Any, NoReturn
 
+import yaml
 from hydra import compose, initialize_config_dir
 from hydra._internal.utils import get_args_parser
 from hydra.core.global_hydra import GlobalHydra
@@ -80,7 +81,7 @@ def in_one_line(error: Exception) -> str:
         if inner and inner.group(1).startswith(f"{key}."):  # of a table that was given whole
             key, beside = inner.group(1), _keys_beside(inner.group(1))
             return unknown_key(key, beside) if beside else f"{key}: entries are added with a plus, as +{key}=..."
-        return _without_its_plus(key) or unknown_key(key, _keys_beside(key))
+        return _without_its_plus(key) or _of_another_option(key) or unknown_key(key, _keys_beside(key))
     return " ".join(line.strip() for line in message.splitlines() if line.strip() and not line.startswith("See http"))
 
 
@@ -103,6 +104,21 @@ def _without_its_plus(key: str) -> str:
         return ""
     word = next((word for word in sys.argv[1:] if word.startswith(f"{key}=")), f"{key}=...")
     return f"{word}: no option stands there yet; did you mean +{word}?"
+
+
+def _of_another_option(key: str) -> str:
+    """The line for a key of a group whose option has none at all, such as `base.mass` of a base that is fixed."""
+    group = key.partition(".")[0]
+    if _keys_beside(key) or group not in chosen():
+        return ""
+    having = " or ".join(f"{group}={one}" for one in options(group) if key.rpartition(".")[2] in _keys_of(group, one))
+    return f"{key}: the option picked in {group} has no keys" + (f"; {having} has this one" if having else "")
+
+
+def _keys_of(group: str, option: str) -> list[str]:
+    """The keys of an option, as its own file writes them."""
+    read = yaml.safe_load((shipped("conf") / group / f"{option}.yaml").read_text(encoding="utf-8"))
+    return list(read or ())
 
 
 def _keys_beside(key: str) -> list[str]:

@@ -139,6 +139,8 @@ def instead(motions: Motions, refused: Sequence[Resampled]) -> str:
         said.append(f"{' '.join(words)} makes the planner seek one that can be{shipped}.")
     elif not any(problem.rest) and unserved(problem) is None and not all(motion.keeps_limits for motion in refused):
         said.append("method.global.transcription=spline keeps the limits between the knots too.")
+    elif not all(problem.rest) and (why := unserved(problem)):
+        said.append(f"No start from rest is sought where {why}.")
     for motion in refused:
         off = float(f"{1.1 * motion.tracking_error:.1e}")
         if len(motion.faults) == 1 and motion.strays:
@@ -162,7 +164,7 @@ def _sent(motions: Motions) -> tuple[tuple[Evaluation, Resampled] | None, tuple[
     refused: list[Resampled] = []
     good = sorted(
         (e for e in motions.solved if e.solution.stretch is None and config.method in ("best", e.method)),
-        key=lambda e: e.objective,
+        key=as_shown,
     )
     for motion in good:
         found = resample(motion.solution.posed(motions.problem), motion, config.rate)
@@ -170,6 +172,11 @@ def _sent(motions: Motions) -> tuple[tuple[Evaluation, Resampled] | None, tuple[
             return (motion, found), tuple(refused)
         refused.append(found)
     return (good[0], refused[0]) if refused and config.force else None, tuple(refused)
+
+
+def as_shown(motion: Evaluation) -> float:
+    """The objective to the four digits that tables show: of motions that are equal there the first listed is best."""
+    return float(f"{motion.objective:.4g}")
 
 
 def resample(problem: Problem, evaluation: Evaluation, rate: float) -> Resampled:

@@ -12,7 +12,7 @@ from pipeline.artifacts.markdown import PEAK, markdown
 from pipeline.artifacts.report import Report
 from pipeline.artifacts.summary import summary
 from pipeline.artifacts.table import rows
-from pipeline.artifacts.verdict import first, status, verdict
+from pipeline.artifacts.verdict import first, percent, status, verdict
 from pipeline.config.documents import Printed
 from pipeline.problem.solution import Status
 from pipeline.studies import export
@@ -87,7 +87,7 @@ def test_why_the_best_is_not_what_is_sent(report: Report) -> None:
     given = replace(sent, before=(passed,), instead="Do this. ")
     said = verdict(report_of(good.motions.problem, [cheap, best], given))
     assert said.startswith("Send global 1: ")
-    assert said.endswith(". lsv 1 would take 50 % less, but starts with a jump. Do this.")
+    assert said.endswith(". lsv 1 would take 50 % less energy, but starts with a jump. Do this.")
 
 
 def test_who_else_leads_to_a_motion(report: Report) -> None:
@@ -118,6 +118,10 @@ def test_a_motion_within_its_limits_comes_before_a_cheaper_one(report: Report) -
     dear = replace(other, objective=9.0, limit_excess={}, limit_excess_between={})
     assert good.objective < 9
     assert first(report_of(problem, [good, dear])) is dear
+
+
+def test_shares_are_no_powers_of_ten() -> None:
+    assert [percent(share) for share in (0.316, -0.0123, 0.994, 1.13, -0.9999)] == ["32", "-1.2", "99", "113", "-100"]
 
 
 def test_the_table_of_motions(report: Report) -> None:

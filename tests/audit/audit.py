@@ -40,7 +40,9 @@ def differences(run: Run, motion: pd.DataFrame, told: Mapping[Any, Any]) -> dict
     places = np.array([robot.tip(one, base) for one, base in zip(q, bases, strict=True)])
     found = {"place": float(np.abs(places - motion[["x", "y", "z"]].to_numpy()).max())}
     task = ["xyz".index(axis) for axis in run.composed["robot"]["task"]]
-    wanted = path(run.composed, robot.tip(np.array(run.composed["robot"]["q_init"])), time)
+    given, begin = run.composed["path"].get("start"), run.composed["robot"]["q_init"]
+    start = robot.tip(q[0] if begin is None else np.array(begin)) if given is None else np.array(given)
+    wanted = path(run.composed, start, time)
     if wanted is not None:
         off = np.linalg.norm((places - wanted)[:, task], axis=1).max()
         found["tracking"] = float(abs(off - told["max_tracking_error"]))

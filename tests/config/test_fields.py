@@ -24,6 +24,7 @@ from pipeline.config.fields import (
     build,
     schema,
 )
+from pipeline.config.messages import unknown_key
 
 
 @schema
@@ -172,6 +173,7 @@ def test_python_is_as_strict_as_a_file() -> None:
     for make in (lambda: Inner(gain=-1), lambda: dataclasses.replace(Inner(), gain=-1)):
         with pytest.raises(ConfigError, match=r"^Inner\.gain = -1: must be a number >= 0$"):
             make()
+    assert unknown_key("innr.gain", ["inner", "other"]).startswith("innr.gain: unknown key; did you mean inner?")
     with pytest.raises(ConfigError, match=r"^Inner\.gian: unknown key; did you mean gain\?"):
         Inner(gian=1)  # type: ignore[call-arg]
     with pytest.raises(ConfigError, match=r"^Inner: 2 values at most, in the order gain, steps"):

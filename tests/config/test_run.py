@@ -13,6 +13,7 @@ import yaml
 from hydra import compose, initialize_config_dir
 from omegaconf import DictConfig, OmegaConf
 
+from pipeline.common.errors import ConfigError
 from pipeline.config import compose as composing
 from pipeline.config import run as schema
 from pipeline.config.documents import printed_for
@@ -169,3 +170,8 @@ def test_no_experiment_picks_a_launcher_or_a_sweeper(experiment: str) -> None:
     base, chosen = composed().hydra, composed(f"+experiment={experiment}").hydra
     for part in ("launcher", "sweeper", "sweep", "run"):
         assert OmegaConf.to_container(chosen[part], resolve=False) == OmegaConf.to_container(base[part], resolve=False)
+
+
+def test_a_word_that_may_stand_beside_lists_is_suggested() -> None:
+    with pytest.raises(ConfigError, match=r"^sweep\.objective = 'kinetic_energy': did you mean kinetic_energy_inte"):
+        checked("sweep.objective=kinetic_energy")

@@ -40,6 +40,7 @@ def test_a_grid_too_coarse_for_the_path_is_refined(turns: Problem) -> None:
     assert f"on {16 * parts} intervals: the 16 of timing.steps are too few" in first.message
 
 
+@pytest.mark.slow
 def test_a_wave_that_its_knots_hardly_show_is_no_jump(tmp_path: Path) -> None:
     """Six periods on 25 and on 38 intervals: the path's own spline is nearly as far off on these as on those."""
     along, across = np.array([np.cos(np.deg2rad(170)), np.sin(np.deg2rad(170))]), np.deg2rad(80)

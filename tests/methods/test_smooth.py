@@ -34,6 +34,8 @@ def test_rest_asks_for_a_spline_and_differences_refuse_it() -> None:
     assert re.match(r"\d distinct opti.* starts; .* confirmed by IPOPT: constraints to \de-\d+, optim", best.evidence)
     with pytest.raises(InputError, match=r"^global: method.global.transcription = differences keeps neither"):
         global_planner(problem, replace(FEW, transcription="differences"))
+    with pytest.raises(InputError, match=r"integrals are bounded, and a spline, which alone keeps boundary\.rest"):
+        global_planner(replace(problem, bounds_of_integrals={"torque": 1.0}), FEW)
     with pytest.raises(InputError, match=r"^pareto: the joints are to rest at an end"):
         pareto(problem)
     assert global_planner(replace(problem, rest=(False, False)), FEW)[0].trajectory.ends is None

@@ -53,6 +53,7 @@ def test_between_equal_way_points_the_tool_waits(tmp_path: Path) -> None:
     np.testing.assert_allclose(problem.task.value(waiting)[:, :3], np.tile([0.45, 0, 0.4], (51, 1)), atol=1e-4)
 
 
+@pytest.mark.slow
 def test_a_turn_that_counts_as_length_takes_its_time(tmp_path: Path) -> None:
     """45 degrees within 5 mm of 200 mm: by length alone they are over within a fortieth of the motion."""
     rows = [f"0.45,{y},0.4,{way}" for y, way in ((-0.1, DOWN), (0, DOWN), (0.005, ROLLED), (0.1, ROLLED))]

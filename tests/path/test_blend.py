@@ -20,7 +20,7 @@ def test_the_deviation_at_a_corner_is_the_one_asked_for(turn: float, blend: floa
     corner = np.array([9.0, 0.0])
     points = np.array([np.zeros(2), corner, corner + 9.0 * np.array([np.cos(turn), np.sin(turn)])])
     curve = Blended(points, blend)
-    s = curve.marks[1] + np.linspace(-0.01, 0.01, 2001) * blend
+    s = curve.marks[1] + np.linspace(-0.01, 0.01, 501) * blend
     assert np.linalg.norm(curve.sample(s)[0] - corner, axis=1).min() == pytest.approx(blend, rel=1e-6)
     assert curve.closer == ()
 

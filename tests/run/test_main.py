@@ -221,6 +221,11 @@ def test_mp4_needs_ffmpeg(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     assert_refused(answer, "artifacts.animation = mp4: needs ffmpeg: pip install '.[film]'; gif needs none")
 
 
+def test_a_key_of_an_option_that_is_not_picked_names_that_one(run: Run) -> None:
+    said = "error: base.mass: the option picked in base has no keys; base=free has this one"
+    assert run("base.kind=free", "base.mass=20").error.startswith(said)
+
+
 def test_files_of_ones_own_are_picked_as_the_projects(run: Run, tmp_path: Path) -> None:
     folder = tmp_path / "mine" / "experiment"
     folder.mkdir(parents=True)

@@ -16,7 +16,7 @@ from pipeline.search.widest import widest
 from tests.support import composed
 
 TIP = "robot.collision={link3: [{kind: sphere, center: [0.1375, 0, 0], radius: 0.01}]}"
-LINE = ("path.start=[0.3,0]", "path.direction=90", "path.length=0.2", "timing.steps=20", "boundary=free")
+LINE = ("path.start=[0.3,0]", "path.direction=90", "path.length=0.2", "timing.steps=8", "boundary=free")
 
 
 def past(*balls: str, margin: float = 0.05) -> Problem:

@@ -161,6 +161,13 @@ def test_the_best_motion_is_the_cheapest_that_hits_nothing() -> None:
     assert isinstance(sent, Resampled)
     assert sent.method == "global"
     assert sent.limit_excess["clearance"] <= 0
+    for cheaper, best in ((1e-7, 1), (1e-3, 2)):  # what a table does not show is not preferred
+        other = replace(
+            around, objective=around.objective * (1 - cheaper), solution=replace(around.solution, optimum=2)
+        )
+        sent = sent_by(there, config, around, other)
+        assert isinstance(sent, Resampled)
+        assert sent.optimum == best
     nothing = sent_by(there, config, through)
     assert nothing is not None
     assert nothing.section()[0].startswith("Exported: nothing")
@@ -201,6 +208,8 @@ def test_a_jump_of_velocity_is_not_sent(line: Case, at_rest: Case) -> None:
         == "boundary.rest=[start,end] makes the planner seek one that can be, and so does +experiment=sim3_sendable. "
     )
     assert instead(Motions(third, replace(at_rest[0], rest=(True, True)), ()), ()) == ""
+    bounded = replace(at_rest[0], rest=(False, False), bounds_of_integrals={"torque": 1.0})
+    assert instead(Motions(third, bounded, ()), ()) == "No start from rest is sought where integrals are bounded. "
 
 
 def test_a_motion_that_ends_while_it_moves_or_off_its_path_is_not_sent(at_rest: Case) -> None:

@@ -228,6 +228,7 @@ function makePlane(place, plane, motions, choose) {
   const [across, up] = [span("x"), span("y")];
   const spot = (u, p) => [u.valToPos(p.x, "x", true), u.valToPos(p.y, "y", true)];
   const values = (_, ticks) => ticks.map(short);
+  const labelFont = `${plane.y.length > 40 ? 9 : 11}px system-ui`; // along 300 pixels
   let focus = null;
   const u = new uPlot(
     {
@@ -238,7 +239,7 @@ function makePlane(place, plane, motions, choose) {
       scales: { x: { time: false, range: () => across }, y: { range: () => up } },
       axes: [
         { values, label: plane.x, labelSize: 22, font: "11px system-ui", labelFont: "12px system-ui" },
-        { values, label: plane.y, size: 66, labelSize: 20, font: "11px system-ui", labelFont: "11px system-ui" },
+        { values, label: plane.y, size: 66, labelSize: 20, font: "11px system-ui", labelFont },
       ],
       series: [{}, { paths: () => null, points: { show: false } }],
       hooks: { draw: [(p) => paint(p)] },

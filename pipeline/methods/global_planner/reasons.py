@@ -108,9 +108,9 @@ def too_near(problem: Problem, optima: int, closest: Closest) -> str:
     lost = "the optimum found comes" if optima == 1 else f"all {optima} optima found come"
     return (
         f"{lost} too near to the arm itself ({said(closest)}, collision.margin = {own.margin:.3g} m), and where that "
-        "is kept none was found; if these may come so near, say so: "
-        f"collision.allow=[[{closest.first},{closest.second}]], or by a smaller collision.margin or an SRDF "
-        "(collision.srdf)"
+        "is kept none was found; if their shapes are at fault, say so: "
+        f"collision.allow=[[{closest.first},{closest.second}]], a smaller collision.margin or an SRDF "
+        "(collision.srdf); if not, move the path"
     )
 
 

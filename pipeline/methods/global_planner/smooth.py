@@ -114,6 +114,9 @@ def unserved(problem: Problem, options: GlobalOptions) -> str | None:
     """What stands against the transcription that is asked for."""
     if splined(problem, options):
         why = why_not(problem)
+        if why and options.transcription is None:
+            kept = "boundary.rest and limits of acceleration or jerk"
+            return f"{why}, and a spline, which alone keeps {kept}, does not serve that"
         return why and f"{why}, which method.global.transcription = spline does not serve"
     if any(problem.rest) or problem.bounds.smooth:
         return (

@@ -35,6 +35,7 @@ from pipeline.methods.pmke.stages import Answer, Stages, why_not
 from pipeline.methods.singularity import singular_value_ratio
 from pipeline.model.clearance import Clearance
 from pipeline.model.kinematics import project
+from pipeline.problem.curve import whole
 from pipeline.problem.limits import LIMIT_KINDS
 from pipeline.problem.objective import Objective
 from pipeline.problem.problem import Boundary, Problem
@@ -47,12 +48,52 @@ TRACKING = 1e-6  # [m]
 PLAN_INTERVALS = 24  # of the plan that is made before anything moves
 
 
+ROUNDS = 6  # motions at most, until one keeps its limits between its knots
+
+
+KEPT, MARGIN = 1e-7, 1e-3  # relative: excess that is none, and what is taken off beyond it
+
+
+SMOOTH = {"acceleration": 2, "jerk": 3}  # orders of derivatives that are largest at a cubic spline's knots
+
+
 FIRST_STARTS = (16, 48)  # of that plan: more if so many find no motion
 
 
 def solve(problem: Problem, options: RecedingOptions, context: Context) -> list[Solution]:
-    """From q_init on knots options.prediction_step apart. Statistics: one entry per update, as of `pmke`."""
-    return [_follow(problem, options)]
+    """From q_init on knots options.prediction_step apart. Statistics: one entry per update, as of `pmke`.
+
+    The curve through the knots exceeds between them what their differences keep. By so much its limits of acceleration
+    and jerk are made smaller, joint by joint, and the path is followed anew; where that does not lead to a curve that
+    keeps them, the first motion is the answer.
+    """
+    first = solution = follow(problem, options)
+    stricter, bounds = problem, problem.bounds
+    for _ in range(ROUNDS if bounds.smooth else 0):
+        if not solution.found:
+            break
+        found = whole(problem, solution.trajectory)
+        reached = {kind: np.abs(found(solution.trajectory.time, order)).max(axis=0) for kind, order in SMOOTH.items()}
+        beyond = {kind: most / getattr(bounds, kind) - 1 for kind, most in reached.items()}
+        if max(float(excess.max()) for excess in beyond.values()) <= KEPT:
+            return [at_rest(problem, solution)]
+        limits = {
+            kind: getattr(stricter.bounds, kind) / np.where(excess > KEPT, (1 + excess) * (1 + MARGIN), 1.0)
+            for kind, excess in beyond.items()
+        }
+        stricter = replace(problem, limits=replace(bounds, **limits))
+        solution = follow(stricter, options)
+    return [first]
+
+
+def at_rest(problem: Problem, solution: Solution) -> Solution:
+    """The motion as the spline that keeps its limits from rest to rest, if that is what is asked; not within a limit of
+    jerk, since it accelerates from its first moment on.
+    """
+    if not all(problem.rest) or np.isfinite(problem.bounds.jerk).any():
+        return solution
+    still = np.zeros((2, problem.task.arm.n))
+    return replace(solution, trajectory=replace(solution.trajectory, ends=still))
 
 
 def refuses(problem: Problem, options: RecedingOptions) -> str | None:
@@ -76,7 +117,8 @@ def _stages_why_not(problem: Problem, options: RecedingOptions) -> str | None:
     return why_not(asked, min(intervals, own + options.tail) * problem.task.arm.n)
 
 
-def _follow(problem: Problem, options: RecedingOptions) -> Solution:
+def follow(problem: Problem, options: RecedingOptions) -> Solution:
+    """One motion, window by window, that keeps its limits at its knots."""
     duration = problem.reference.duration
     count = max(1, round(duration / options.prediction_step))
     times = np.linspace(0.0, duration, count + 1)
@@ -124,12 +166,12 @@ def _follow(problem: Problem, options: RecedingOptions) -> Solution:
 def _first_plan(problem: Problem, objective: Objective) -> tuple[Callable[[Array], Array] | None, str]:
     """The whole motion on a coarse grid, as the global planner finds it; or None, and why there is none."""
     times = np.linspace(0.0, problem.reference.duration, PLAN_INTERVALS + 1)
-    whole = replace(problem, times=times, objective=objective, boundary=Boundary.FIXED)
+    asked = replace(problem, times=times, objective=objective, boundary=Boundary.FIXED)
     # By differences as the windows are, unless accelerations or jerks are limited, of which those know nothing.
     form: Literal["differences"] | None = None if problem.bounds.smooth else "differences"
     for starts in FIRST_STARTS:
         options = GlobalOptions(transcription=form, optimised=starts, budget=starts, refine_to=None)
-        first = global_planner(whole, options)[0]
+        first = global_planner(asked, options)[0]
         if first.found:
             return _through(first.trajectory.time, first.trajectory.q), ""
     return None, first.message

@@ -11,11 +11,12 @@ from pipeline.config.methods import PmkeOptions, RecedingOptions
 from pipeline.evaluation.evaluation import evaluate
 from pipeline.methods.global_planner.planner import global_planner
 from pipeline.methods.pmke.predictive import pmke
-from pipeline.methods.pmke.receding import _knots, receding
+from pipeline.methods.pmke.receding import _knots, at_rest, follow, receding
 from pipeline.problem.costs import integrals
+from pipeline.problem.curve import curve
 from pipeline.problem.objective import Objective
 from pipeline.problem.problem import Problem
-from pipeline.problem.solution import Status
+from pipeline.problem.solution import Solution, Status, Trajectory
 from tests.support import FEW, composed
 
 WINDOW = RecedingOptions(prediction_step=0.2, horizon=5, update_interval=0.6)
@@ -109,7 +110,7 @@ def test_jerks_are_limited_from_rest_to_rest() -> None:
     asked = trajectory3(*ends, "boundary.zero_acceleration=true", "limits.jerk=2")
     most, energy = [], []
     for problem in (free, asked):
-        done = receding(problem, WINDOW)[0]
+        done = follow(problem, WINDOW)
         judged = evaluate(problem, done)
         assert judged.status is Status.SOLVED, judged.message
         assert {entry["status"] for entry in done.statistics["predictions"]} == {"newton"}
@@ -122,6 +123,28 @@ def test_jerks_are_limited_from_rest_to_rest() -> None:
     assert most[1][1] == pytest.approx(2, rel=1e-6)
     assert judged.limit_excess["jerk"] == pytest.approx(0, abs=1e-6)
     assert energy[0] < energy[1] < 1.01 * energy[0]
+
+
+@pytest.mark.slow
+def test_the_curve_keeps_limits_between_its_knots() -> None:
+    """Its spline would exceed what its knots' differences keep."""
+    asked = trajectory3("boundary.rest=[start,end]", "limits.acceleration=1", "boundary.zero_acceleration=true")
+    asked = replace(asked, limits=replace(asked.bounds, jerk=np.full(3, 2.0)))
+    done = receding(asked, WINDOW)[0]
+    judged = evaluate(asked, done)
+    spline = curve(asked, done.trajectory.time, done.trajectory.q)
+    assert 1.8 < float(np.abs(spline(done.trajectory.time, 3)).max()) <= 2 * (1 + 1e-6)
+    assert judged.status is Status.SOLVED, judged.message
+    assert judged.limit_excess_between["jerk"] <= 1e-6
+
+
+def test_from_rest_it_is_a_spline_that_can_be_sent() -> None:
+    """Not within a limit of jerk: it accelerates from its first moment on."""
+    rests, one = trajectory3("boundary.rest=[start,end]", "limits.acceleration=1"), trajectory3()
+    done = Solution("receding", Trajectory(rests.times, np.tile(rests.q_init, (51, 1))), Status.SOLVED)
+    jerks = replace(rests, limits=replace(rests.bounds, jerk=np.full(3, 2.0)))
+    np.testing.assert_array_equal(at_rest(rests, done).trajectory.ends, np.zeros((2, 3)))
+    assert at_rest(jerks, done).trajectory.ends is at_rest(one, done).trajectory.ends is None
 
 
 def test_what_receding_does_not_serve_is_said() -> None:
