@@ -114,7 +114,7 @@ def test_a_time_that_is_too_short_is_answered_with_the_shortest() -> None:
 @pytest.mark.slow
 def test_simulation_3_and_4_from_rest_to_rest() -> None:
     """Simulation 3 costs .1090 then, and 4 has no motion within its limits below 1.005 s (CasADi; `sending`)."""
-    rest = ("boundary.rest=[start,end]", "timing.steps=50", "method.global.solver=newton")
+    rest = ("boundary.rest=[start,end]", "timing.steps=40", "method.global.solver=newton")
     third = prepare(composed("+experiment=sim3", *rest))
     best = evaluate(third, global_planner(third, replace(FEW, optimised=1))[0])
     assert best.integral("torque") == pytest.approx(0.1090, rel=5e-3)

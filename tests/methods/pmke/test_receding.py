@@ -75,7 +75,7 @@ def test_torque_as_the_objective_of_the_predictions_costs_less_torque() -> None:
 
 @pytest.mark.slow
 def test_what_cannot_be_met_is_said() -> None:
-    asked = trajectory3("limits.velocity=0.12", "timing.steps=25")
+    asked = trajectory3("limits.velocity=0.05", "timing.steps=25")
     done = receding(asked, WINDOW)[0]
     assert not done.found
     assert done.status is Status.INFEASIBLE
