@@ -49,6 +49,7 @@ def curve() -> CubicSpline:
     return CubicSpline(KNOTS, start + np.vstack([np.zeros(7), np.cumsum(steps, axis=0)]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", SOLIDS, ids=lambda shape: shape.name)
 def test_the_bound_holds_for_every_kind(shape: Shape, arm: Arm, curve: CubicSpline) -> None:
     """Never above what coal finds, and hardly below; the solver measures the same."""

@@ -129,6 +129,7 @@ def test_a_cart_is_drawn_and_can_be_a_rail() -> None:
     assert "planar" not in xml
 
 
+@pytest.mark.slow
 def test_a_cart_may_touch_its_floor() -> None:
     """Where collision.allow says so, an obstacle's name in it; another name is refused."""
     words = (*CART, *STANDS)
@@ -178,6 +179,7 @@ def least(model: Any, solids: Any, q: Any, pairs: Any) -> float:
     return float(found)
 
 
+@pytest.mark.slow
 def test_the_other_arm_is_seen(rng: np.random.Generator) -> None:
     """Baxter's left arm moves, its right one is held and stands in the way: as coal sees it, held otherwise too."""
     for held in (DOWN, {"right_s0": -0.6}):
@@ -211,6 +213,7 @@ def test_a_gripper_stands_at_its_width(width: float) -> None:
         assert ours == pytest.approx(least(model, solids, q, [pair]), abs=1e-6)
 
 
+@pytest.mark.slow
 def test_other_limbs_are_drawn_where_they_are_held() -> None:
     """And the arm itself is not, nor fingers, nor what nobody could read."""
     arm = Arm(urdf.read(find(BAXTER), "left_gripper", locked=DOWN))

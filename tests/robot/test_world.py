@@ -147,6 +147,7 @@ def test_a_mesh_that_is_missing_names_its_model(folder: Path) -> None:
         _ = part.points
 
 
+@pytest.mark.slow
 def test_a_cell_around_the_arm() -> None:
     """The one that comes with the project, with shapes beside it."""
     ball = "+obstacles.shapes.ball={kind: sphere, center: [0, 0, 1.5]}"

@@ -25,6 +25,7 @@ def past(*balls: str, margin: float = 0.05) -> Problem:
     return prepare(composed(TIP, *LINE, f"+obstacles.shapes={{{shapes}}}", f"obstacles.margin={margin}"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("aside", "width"), [(0.07, 0.04), (0.02, -0.01), (0.1, 0.05)])
 def test_it_is_what_the_path_leaves_to_the_tool(aside: float, width: float) -> None:
     """The balls' distance at the path's middle, whatever the joints do: less than nothing, or the margin and more."""
