@@ -20,15 +20,14 @@ from pipeline.model.places import Places
 from pipeline.robot.shapes import SLAB, Shape
 from pipeline.robot.touching import groups
 from tests.coal_solids import least
-from tests.support import BALL, BOX, ROD, composed, robot
+from tests.support import BALL, BOX, ROD, composed
 
-HAND = next(shape for shape in robot("panda").description.collision if shape.frame == "panda_hand")
 SOLIDS = (
     replace(BALL, position=(0.3, 0.6, 0.6)),
     BOX,
     ROD,
     Shape("drum", "cylinder", (0.1, 0.3), (0.5, 0.3, 0.2), (0.4, 0.2, 0.0)),
-    Shape("part", "mesh", (3.0, 3.0, 3.0), (0.7, 0.1, 0.1), (0.5, 0.0, 0.3), file=HAND.file),
+    Shape("part", "mesh", (3.0, 3.0, 3.0), (0.7, 0.1, 0.1), (0.5, 0.0, 0.3)),  # the hand, enlarged
     Shape("floor", "half_space", SLAB, (0.0, 0.0, 0.02)),
     Shape("slope", "half_space", SLAB, (0.0, 0.9, 0.0), (0.9, 0.0, 0.0)),
 )
@@ -53,6 +52,8 @@ def curve() -> CubicSpline:
 @pytest.mark.parametrize("shape", SOLIDS, ids=lambda shape: shape.name)
 def test_the_bound_holds_for_every_kind(shape: Shape, arm: Arm, curve: CubicSpline) -> None:
     """Never above what coal finds, and hardly below; the solver measures the same."""
+    hand = next(own for own in arm.description.collision if own.frame == "panda_hand")
+    shape = replace(shape, file=hand.file) if shape.kind == "mesh" else shape
     among = Obstacles((shape,), 0.02)
     clearance, places, carried = Clearance(arm, among), Places(arm), groups(arm.description)
     found = certified.closest(clearance, clearance.obstacles, curve, KNOTS)

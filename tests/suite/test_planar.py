@@ -1,4 +1,4 @@
-"""The planner's default beside a brute-force search on eight of thirty random problems (`planar.csv`, `planar.py`).
+"""The planner's default beside a brute-force search on six of thirty random problems (`planar.csv`, `planar.py`).
 
 All thirty: python -m tests.suite.test_planar
 """
@@ -45,7 +45,7 @@ def missed(names: Iterable[str]) -> tuple[list[str], int, int]:
 @pytest.mark.slow
 def test_the_best_is_found_and_nearly_all_below_three_times_the_best() -> None:
     assert len(KNOWN) == sum(COUNTS.values())
-    lost, listed, not_listed = missed(KNOWN["name"][::4])
+    lost, listed, not_listed = missed(KNOWN["name"][::5])
     assert lost == []
     assert listed >= 0.95 * (listed + not_listed), f"{not_listed} not found beside {listed}"
 
