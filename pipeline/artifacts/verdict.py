@@ -126,6 +126,9 @@ def _reasons(report: Report, e: Evaluation) -> str:
     parts.append(f"path error {e.tracking_error_between:.1g} m")
     if e.orientation_error_between > 0:
         parts[-1] += f" and {e.orientation_error_between:.1g} rad"
+    if not problem.reference.timing.at_rest:  # such a path asks for it; the robot has to be brought there
+        joint, arm = int(np.abs(e.qd[0]).argmax()), problem.task.arm.description
+        parts.append(f"begins at speed ({arm.actuated[joint]} at {abs(e.qd[0, joint]):.3g} {arm.unit(joint)}/s)")
     own = e.near.own
     if np.isfinite(own.bound):
         parts.append(f"clear of itself by {1000 * own.bound:.3g} mm ({own.first} and {own.second})")

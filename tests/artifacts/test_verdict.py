@@ -14,6 +14,7 @@ from pipeline.artifacts.summary import summary
 from pipeline.artifacts.table import rows
 from pipeline.artifacts.verdict import first, percent, status, verdict
 from pipeline.config.documents import Printed
+from pipeline.path.timing import ConstantSpeed
 from pipeline.problem.solution import Status
 from pipeline.studies import export
 from pipeline.studies.estimate import Comparison, Estimate
@@ -76,6 +77,18 @@ def test_what_to_send_and_why(report: Report) -> None:
     clear = 1000 * good.motions.evaluations[1].clearance_between
     assert f"clearance {clear:.3g} mm, peak acceleration " in said
     assert said.endswith("; confirmed by IPOPT; not checked: self-collision.")
+
+
+def test_a_path_that_is_entered_at_speed_says_so(report: Report) -> None:
+    good = within(report)
+    assert "begins at speed" not in verdict(good)
+    reference = good.motions.problem.reference
+    flying = replace(
+        good.motions.problem, reference=replace(reference, timing=ConstantSpeed(reference.timing.duration))
+    )
+    evaluations = [replace(e, qd=np.full_like(e.qd, [0.1, -0.3, 0.2])) for e in good.motions.evaluations]
+    said = verdict(report_of(flying, evaluations, good.find(export.Resampled)))
+    assert f", begins at speed ({flying.task.arm.description.actuated[1]} at 0.3 rad/s)" in said
 
 
 def test_why_the_best_is_not_what_is_sent(report: Report) -> None:
