@@ -58,3 +58,15 @@ def test_where_all_are_too_near_the_pair_and_the_keys_are_named(monkeypatch: pyt
     assert "too near to the arm itself (base and link2 are 0.1" in one.message
     assert "collision.allow=[[base,link2]]" in one.message
     assert said.count("keeping the arm off itself") == 1
+
+
+@pytest.mark.slow
+def test_optima_that_are_left_out_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(
+        planner, "apart", lambda _, found, *__: [found[0], *(replace(one, converged=False) for one in found[1:])]
+    )
+    words = (f"robot.collision={SHAPES}", "collision.margin=0.01", "collision.self=true", *FEW_STARTS)
+    config = composed("+experiment=traj3", "timing.steps=10", *words)
+    (one,) = global_planner(prepare(config), config.method.of("global"))
+    assert "; 2 more left out, too near to the arm itself; " in one.evidence
+    assert one.statistics[planner.LOST] == 2

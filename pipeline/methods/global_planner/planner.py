@@ -135,10 +135,12 @@ def _searched(
         best = min((fine.cost for fine, _ in found), default=np.inf)
         sent = [pair for pair in found if pair[0].cost == best or finer(problem, MOST, [pair[0].q]) is None]
         log["optima_off_path"], found = len(found) - len(sent), sent
+    lost = 0
     if afterwards and found:
         problem, near = replace(given, times=problem.times), [fine for fine, _ in found]
         clear = apart(problem, near, options, context)
         found = [(fine, members) for fine, (_, members) in zip(clear, found, strict=True) if _good(fine)]
+        log[LOST] = lost = len(near) - len(found)
         if not found:
             context.phase("keeping the arm off itself")
             options = replace(options, max_iterations=min(options.max_iterations, AGAIN))
@@ -149,7 +151,7 @@ def _searched(
         return [nothing(problem, Status.NOT_CONVERGED, why_not, log)]
     members = {id(fine): count for fine, count in found}
     ranked = in_order(problem, basins(problem, problem.times, [fine for fine, _ in found], options.same_path).optima)
-    words = reasons.counted(len(ranked), len(starts), coarse.barren, left)
+    words = reasons.counted(len(ranked), len(starts), coarse.barren, left, lost)
     solutions = []
     for rank, (fine, moved) in enumerate(ranked):
         said = reasons.on_how_many(problem, asked, options, [fine.q]) if rank == 0 else ""

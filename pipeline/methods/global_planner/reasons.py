@@ -26,11 +26,14 @@ REACHED = 1e-6  # [m, rad]
 NODES = 1000  # of the longest self-motion manifold
 
 
-def counted(optima: int, starts: int, barren: int, left: int = 0) -> str:
-    """How many optima came of how many starts; `left` dearer ones were not carried to the long path's knots."""
+def counted(optima: int, starts: int, barren: int, left: int = 0, lost: int = 0) -> str:
+    """How many optima came of how many starts; `left` dearer ones were not carried to the long path's knots, and `lost`
+    came too near to the arm itself and were not, or not well, solved again.
+    """
     count = f"{optima} distinct {_named(optima)} found from {starts} starts"
     dearer = f"{left} dearer one{'s' if left > 1 else ''} of the coarse grid not refined; " if left else ""
-    return f"{count}; the last {barren} starts brought nothing new; {dearer}"
+    near = f"{lost} more left out, too near to the arm itself; " if lost else ""
+    return f"{count}; the last {barren} starts brought nothing new; {dearer}{near}"
 
 
 def _named(count: int) -> str:
