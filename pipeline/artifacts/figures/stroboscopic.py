@@ -91,9 +91,11 @@ def stroboscopic(problem: Problem, evaluations: Sequence[Evaluation], name: str)
             axes.set_aspect("equal")
             tidy(axes)
         else:
-            axes.set_box_aspect(high - low, zoom=1.2)
+            axes.set_box_aspect(high - low, zoom=1.1)
+            axes.patch.set_visible(False)  # it would cover the label of the panel before
             axes.view_init(elev=22, azim=-55)
-    bar = figure.colorbar(ScalarMappable(clock, TIME_RAMP), ax=panels, shrink=0.8, aspect=30, pad=0.02)
+    apart = 0.02 if planar else 0.1  # room for the label of a third axis
+    bar = figure.colorbar(ScalarMappable(clock, TIME_RAMP), ax=panels, shrink=0.8, aspect=30, pad=apart)
     bar.set_label("Time of the pose [s]")
     entries = [
         Line2D([], [], marker="s", linestyle="", color=INK, markersize=7, label="Joint 1"),
